@@ -1,0 +1,243 @@
+//! A scenario: what a team does, with what, for how long, and when that counts as success.
+
+use serde::{Deserialize, Serialize};
+
+/// One run, as `config/scenarios/*.toml` describe it. The team's file lies underneath: what the
+/// scenario doesn't say, the team says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Short name, for reports.
+    pub name: String,
+    /// What it shows, in a sentence.
+    pub description: String,
+    /// The team's file in `config/teams`, without `.toml`.
+    pub team: String,
+    /// Simulated time.
+    pub duration_s: f64,
+    /// Seed of everything random; `--seed` overrides it.
+    #[serde(default)]
+    pub seed: u64,
+    /// Period of a tick.
+    pub control_period_s: f64,
+    /// Age in ticks of the team command that a servo uses.
+    #[serde(default)]
+    pub coordination_delay_ticks: u64,
+    /// The carried object.
+    pub object: Object,
+    /// The robots, in the order of their indices.
+    pub robots: Vec<Member>,
+    /// How hands hold the object.
+    pub grasp: Grasp,
+    /// The hybrid law.
+    pub hybrid: Hybrid,
+    /// The simulated world.
+    #[serde(default)]
+    pub physics: Physics,
+    /// What the simulated sensors add to the truth.
+    #[serde(default)]
+    pub sensors: Sensors,
+    /// When the run counts as a success.
+    #[serde(default)]
+    pub thresholds: Thresholds,
+    /// Where processes run.
+    #[serde(default)]
+    pub placement: Placement,
+}
+
+/// The carried object: a box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Object {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Full edge lengths.
+    pub size_m: [f64; 3],
+    /// Centre in the world at the start.
+    pub position_m: [f64; 3],
+    /// Heading at the start.
+    #[serde(default)]
+    pub yaw_deg: f64,
+}
+
+/// A robot of the team, and where it stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Member {
+    /// Name, unique in the team.
+    pub name: String,
+    /// The robot's folder-less file in `config/robots`, without `.toml`.
+    pub model: String,
+    /// Midpoint between its soles, in the world.
+    pub x_m: f64,
+    /// Midpoint between its soles, in the world.
+    pub y_m: f64,
+    /// Heading.
+    pub yaw_deg: f64,
+    /// Hands that grasp, by name; all hands of the model when absent.
+    #[serde(default)]
+    pub hands: Option<Vec<String>>,
+}
+
+/// How hands hold the object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Grasp {
+    /// A rigid grasp: a weld equality of the simulator.
+    Weld {
+        /// Largest grasp offset along each axis, drawn by seed.
+        offset_m: f64,
+    },
+    /// A 6-DoF spring and damper at each hand.
+    Spring {
+        /// Largest grasp offset along each axis, drawn by seed.
+        offset_m: f64,
+        /// Translational stiffness.
+        stiffness_n_m: f64,
+        /// Translational damping.
+        damping_ns_m: f64,
+        /// Rotational stiffness.
+        stiffness_nm_rad: f64,
+        /// Rotational damping.
+        damping_nms_rad: f64,
+    },
+}
+
+/// The hybrid law's parameters (the paper's section 3).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hybrid {
+    /// When the law starts; never when absent.
+    #[serde(default)]
+    pub start_s: Option<f64>,
+    /// Position gain kz (eq. 39).
+    pub kz: f64,
+    /// Force gain kh (eq. 34) of force axes.
+    pub kh_m_n: f64,
+    /// Force gain kh (eq. 34) of moment axes.
+    pub kh_rad_nm: f64,
+    /// Corner frequency of the wrist wrench filter.
+    pub filter_hz: f64,
+    /// Which internal forces are controlled.
+    #[serde(default)]
+    pub internal_forces: InternalForces,
+    /// Exceptions to "the object by position, internal forces by force to zero".
+    #[serde(default)]
+    pub axes: Vec<AxisControl>,
+}
+
+/// The rows of C.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum InternalForces {
+    /// A balanced tree over robots, then over their arms: eq. 44 for four robots.
+    #[default]
+    BalancedTree,
+    /// The chain of the paper's eq. 24 and Fig. 3: each robot's arms, then robot i against i + 1.
+    Chain,
+    /// (n − 1) × n coefficients, row by row.
+    Matrix(Vec<Vec<f64>>),
+}
+
+/// One axis of one row that departs from the default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisControl {
+    /// `object`, or the name of an internal force as `mikoshi plan` prints it.
+    pub row: String,
+    /// The axis: of the object's coordinate frame for internal rows, of the world for the object.
+    pub axis: Axis,
+    /// What is controlled along it.
+    pub control: Control,
+    /// Its reference: N, Nm, m or rad. Positions are relative to the grasp.
+    #[serde(default)]
+    pub reference: f64,
+}
+
+/// An axis of a 6-vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+    Roll,
+    Pitch,
+    Yaw,
+}
+
+/// What a selection matrix selects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Control {
+    Position,
+    Force,
+}
+
+/// The simulated world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Physics {
+    /// Physics step; it divides the control period.
+    pub step_s: f64,
+    /// Sliding friction of soles and floor.
+    pub friction: f64,
+}
+
+impl Default for Physics {
+    fn default() -> Self {
+        Self { step_s: 0.001, friction: 1.0 }
+    }
+}
+
+/// What the simulated sensors add to the truth, by seed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Sensors {
+    /// Standard deviation of each wrist and ankle force.
+    pub force_noise_n: f64,
+    /// Standard deviation of each wrist and ankle moment.
+    pub moment_noise_nm: f64,
+    /// Standard deviation of each encoder.
+    pub encoder_noise_rad: f64,
+    /// Standard deviation of each gyroscope axis.
+    pub gyro_noise_rad_s: f64,
+    /// Standard deviation of each accelerometer axis.
+    pub accelerometer_noise_m_s2: f64,
+    /// Age of every reading.
+    pub delay_ticks: u64,
+}
+
+/// When a run counts as a success; a figure that is absent is not judged.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Thresholds {
+    pub internal_start_min_n: Option<f64>,
+    pub internal_after_3s_n: Option<f64>,
+    pub internal_after_3s_nm: Option<f64>,
+    pub internal_end_n: Option<f64>,
+    pub internal_end_nm: Option<f64>,
+    pub object_position_peak_m: Option<f64>,
+    pub object_attitude_peak_rad: Option<f64>,
+    pub foot_slip_max_m: Option<f64>,
+    pub joint_margin_min_rad: Option<f64>,
+    pub saturated_ticks_max: Option<u64>,
+    pub zmp_margin_min_m: Option<f64>,
+}
+
+/// Where processes run. Empty lists leave the choice to the operating system.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Placement {
+    /// Core of the bridge.
+    pub bridge_core: Option<usize>,
+    /// Core of the coordinator.
+    pub coordinator_core: Option<usize>,
+    /// Cores of the servos, in turn.
+    pub servo_cores: Vec<usize>,
+    /// FIFO priority of all services; absent for the ordinary scheduler.
+    pub fifo_priority: Option<u8>,
+}

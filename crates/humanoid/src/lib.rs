@@ -1,0 +1,1 @@
+//! One humanoid robot: model, kinematics, whole-body inverse kinematics, estimation, balance.

@@ -1,0 +1,1 @@
+//! Tick schedules, clocks, transports, waiting, domains, affinity.

@@ -1,0 +1,133 @@
+//! What makes a struct a payload: its name, its layout, and who may read it.
+
+use bytemuck::Pod;
+
+/// Who may subscribe to a payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Audience {
+    /// Services and observers.
+    Everyone,
+    /// Observers only: ground truth and diagnostics, which control must not see.
+    Observers,
+}
+
+/// One field of a payload, for those who name a differing byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// The field's name, which ends in its unit.
+    pub name: &'static str,
+    /// Offset from the payload's start.
+    pub offset_bytes: usize,
+    /// Size in the payload.
+    pub size_bytes: usize,
+}
+
+/// A plain value that travels in a [`Frame`](crate::Frame).
+///
+/// Implemented by the `payload!` macro only, which derives [`Pod`]: no padding, any bit pattern valid.
+pub trait Payload: Pod + PartialEq + core::fmt::Debug + Send + Sync {
+    /// The name under which the payload is published, for one robot or for the team.
+    const NAME: &'static str;
+    /// The payload's definition as text: what its schema hash is made of.
+    const DEFINITION: &'static str;
+    /// The payload's fields, in order.
+    const FIELDS: &'static [Field];
+    /// Who may read it.
+    const AUDIENCE: Audience;
+    /// Hash of the definition and of the limits: two builds exchange frames only if it agrees.
+    const SCHEMA_HASH: u64 = schema_hash(Self::NAME, Self::DEFINITION, size_of::<Self>());
+    /// Type name on the wire; it carries the schema hash, since iceoryx2 rejects another size but
+    /// would accept another layout under the same name.
+    const TYPE_NAME: &'static str;
+
+    /// The field that holds the byte at `offset_bytes`.
+    fn field_at(offset_bytes: usize) -> Option<&'static Field> {
+        Self::FIELDS
+            .iter()
+            .find(|field| (field.offset_bytes..field.offset_bytes + field.size_bytes).contains(&offset_bytes))
+    }
+}
+
+/// A payload that services may subscribe to. Ground truth does not implement it, so that a service
+/// which reads ground truth does not compile.
+pub trait ServicePayload: Payload {}
+
+/// FNV-1a over name, definition and size.
+pub const fn schema_hash(name: &str, definition: &str, size_bytes: usize) -> u64 {
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    let hash = fnv1a(OFFSET, name.as_bytes());
+    let hash = fnv1a(hash, definition.as_bytes());
+    fnv1a(hash, &(size_bytes as u64).to_le_bytes())
+}
+
+const fn fnv1a(mut hash: u64, bytes: &[u8]) -> u64 {
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let mut i = 0;
+    while i < bytes.len() {
+        hash = (hash ^ bytes[i] as u64).wrapping_mul(PRIME);
+        i += 1;
+    }
+    hash
+}
+
+/// Longest type name: payload name, a colon and sixteen hexadecimal digits.
+pub(crate) const TYPE_NAME_CAPACITY: usize = 64;
+
+/// `NAME:0123456789abcdef`, at compile time.
+pub(crate) const fn type_name_bytes(name: &str, hash: u64) -> ([u8; TYPE_NAME_CAPACITY], usize) {
+    let mut bytes = [0; TYPE_NAME_CAPACITY];
+    let name = name.as_bytes();
+    let mut length = 0;
+    while length < name.len() {
+        bytes[length] = name[length];
+        length += 1;
+    }
+    bytes[length] = b':';
+    length += 1;
+    let mut digit = 0;
+    while digit < 16 {
+        let nibble = (hash >> (60 - 4 * digit)) as u8 & 0xf;
+        bytes[length] = if nibble < 10 { b'0' + nibble } else { b'a' + nibble - 10 };
+        length += 1;
+        digit += 1;
+    }
+    (bytes, length)
+}
+
+/// Defines a payload: the struct, its layout as data, and its wire name.
+macro_rules! payload {
+    (@audience Everyone $name:ident) => { impl $crate::ServicePayload for $name {} };
+    (@audience Observers $name:ident) => {};
+    (
+        $(#[$meta:meta])*
+        $audience:ident $wire_name:literal
+        pub struct $name:ident { $( $(#[$field_meta:meta])* pub $field:ident : $type:ty ),* $(,)? }
+    ) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+        pub struct $name { $( $(#[$field_meta])* pub $field: $type ),* }
+
+        impl $crate::Payload for $name {
+            const NAME: &'static str = $wire_name;
+            const DEFINITION: &'static str = concat!($( stringify!($field), ":", stringify!($type), ";" ),*);
+            const FIELDS: &'static [$crate::Field] = &[$( $crate::Field {
+                name: stringify!($field),
+                offset_bytes: core::mem::offset_of!($name, $field),
+                size_bytes: size_of::<$type>(),
+            } ),*];
+            const AUDIENCE: $crate::Audience = $crate::Audience::$audience;
+            const TYPE_NAME: &'static str = {
+                const NAMED: ([u8; $crate::layout::TYPE_NAME_CAPACITY], usize) =
+                    $crate::layout::type_name_bytes($wire_name, <$name as $crate::Payload>::SCHEMA_HASH);
+                match core::str::from_utf8(NAMED.0.split_at(NAMED.1).0) {
+                    Ok(name) => name,
+                    Err(_) => panic!("wire names are ASCII"),
+                }
+            };
+        }
+
+        $crate::layout::payload!(@audience $audience $name);
+    };
+}
+pub(crate) use payload;

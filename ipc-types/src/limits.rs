@@ -1,0 +1,14 @@
+//! How large a team and its robots may be on the wire.
+//!
+//! The mathematics has no such limits: `mikoshi-cooperation` is used with 1000 robots.
+
+/// Robots in one team.
+pub const MAX_ROBOTS: usize = 16;
+/// Grasping hands of one robot.
+pub const MAX_HANDS: usize = 4;
+/// Actuated joints of one robot.
+pub const MAX_JOINTS: usize = 64;
+/// Feet of one robot.
+pub const MAX_FEET: usize = 2;
+/// Grasping hands of one team.
+pub const MAX_HANDS_OF_TEAM: usize = MAX_ROBOTS * MAX_HANDS;

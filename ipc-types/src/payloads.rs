@@ -1,0 +1,186 @@
+//! Every payload that travels.
+//!
+//! Conventions: poses are `[x, y, z, qw, qx, qy, qz]`, wrenches force before moment (the paper's
+//! eq. 1), twists linear before angular. World is the common frame of the team (the paper's Σo).
+//! Entries past a count are zero.
+
+use crate::layout::payload;
+use crate::{MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS, MAX_ROBOTS};
+
+/// `[x, y, z, qw, qx, qy, qz]`, metres and a unit quaternion.
+pub type PoseWire = [f64; 7];
+/// `[fx, fy, fz, nx, ny, nz]`, N and Nm.
+pub type WrenchWire = [f64; 6];
+/// `[vx, vy, vz, wx, wy, wz]`, m/s and rad/s.
+pub type TwistWire = [f64; 6];
+
+/// Team modes, as `TeamCommand::team_mode` and `TeamState::team_mode` carry them.
+pub mod mode {
+    /// Commands are constant; nothing is controlled but each robot's own balance.
+    pub const HOLD: u64 = 1;
+    /// The hybrid law controls object and internal forces.
+    pub const HYBRID: u64 = 2;
+    /// A fault ended the run: every command is constant.
+    pub const SAFE_STOP: u64 = 3;
+}
+
+/// Bits of `RobotState::flags`.
+pub mod flag {
+    /// A joint command stands at its position limit.
+    pub const JOINT_LIMIT: u64 = 1 << 0;
+    /// A joint command stands at its velocity limit.
+    pub const VELOCITY_LIMIT: u64 = 1 << 1;
+    /// The hands do not follow their references within tolerance.
+    pub const HANDS_BEHIND: u64 = 1 << 2;
+    /// An input of this tick was unusable; the command is the last good one.
+    pub const INPUT_REJECTED: u64 = 1 << 3;
+}
+
+payload! {
+    /// bridge → servo: what robot r's sensors read at the start of a tick.
+    Everyone "sensors"
+    pub struct Sensors {
+        /// Encoder angles in the order of the robot's description.
+        pub joint_position_rad: [f64; MAX_JOINTS],
+        /// Encoder rates.
+        pub joint_velocity_rad_s: [f64; MAX_JOINTS],
+        /// Torque that each drive applied, averaged over the last tick.
+        pub joint_torque_nm: [f64; MAX_JOINTS],
+        /// Wrist sensors: wrench that the arm applies to what is outboard, at the sensor, in its axes.
+        pub wrist_wrench: [WrenchWire; MAX_HANDS],
+        /// Ankle sensors: wrench that the leg applies to what is outboard, at the sensor, in its axes.
+        pub ankle_wrench: [WrenchWire; MAX_FEET],
+        /// Gyroscope, in the IMU's axes.
+        pub imu_angular_velocity_rad_s: [f64; 3],
+        /// Accelerometer (specific force: it reads +9.81 upwards at rest), in the IMU's axes.
+        pub imu_specific_force_m_s2: [f64; 3],
+    }
+}
+
+payload! {
+    /// servo → coordinator: where robot r's hands are and what they apply to the object.
+    Everyone "robot-state"
+    pub struct RobotState {
+        /// Measured pose of each hand in the world: encoders, stance-foot odometry, IMU.
+        pub hand_pose: [PoseWire; MAX_HANDS],
+        /// Pose of each hand by the commanded posture of the last tick: what the IK achieved.
+        pub hand_pose_commanded: [PoseWire; MAX_HANDS],
+        /// Wrench that each hand applies to the object, at the hand's origin, in world axes.
+        pub hand_wrench: [WrenchWire; MAX_HANDS],
+        /// Measured centre of mass in the world.
+        pub com_position_m: [f64; 3],
+        /// Measured base pose in the world.
+        pub base_pose: PoseWire,
+        /// Measured zero moment point in the world, on the ground.
+        pub zmp_position_m: [f64; 2],
+        /// Distance from the zero moment point to the edge of the support polygon; negative outside.
+        pub zmp_margin_m: f64,
+        /// Distance from the capture point to the edge of the support polygon; negative outside.
+        pub capture_point_margin_m: f64,
+        /// Smallest distance of a joint from its limit.
+        pub joint_margin_min_rad: f64,
+        /// Largest distance between a hand's reference and what the IK achieved.
+        pub hand_error_max_m: f64,
+        /// Bits of [`flag`].
+        pub flags: u64,
+    }
+}
+
+payload! {
+    /// coordinator → servo: what robot r is to do.
+    Everyone "team-command"
+    pub struct TeamCommand {
+        /// Reference pose of each hand in the world.
+        pub hand_pose_ref: [PoseWire; MAX_HANDS],
+        /// Reference twist of each hand in the world.
+        pub hand_twist_ref: [TwistWire; MAX_HANDS],
+        /// One of [`mode`].
+        pub team_mode: u64,
+        /// Tick of the robot states that this command is computed from.
+        pub state_tick: u64,
+    }
+}
+
+payload! {
+    /// servo → bridge: position references for robot r's drives at the end of the tick.
+    Everyone "joint-command"
+    pub struct JointCommand {
+        /// Reference angles in the order of the robot's description.
+        pub joint_position_ref_rad: [f64; MAX_JOINTS],
+        /// Reference rates, for the drives' velocity feed-forward.
+        pub joint_velocity_ref_rad_s: [f64; MAX_JOINTS],
+        /// Tick of the team command that this command is computed from.
+        pub team_command_tick: u64,
+    }
+}
+
+payload! {
+    /// coordinator → observers: the team's view of the object and of the internal forces.
+    Observers "team-state"
+    pub struct TeamState {
+        /// Measured generalized force h_c (eqs. 11, 28), filtered; row 0 external, then internal.
+        pub generalized_force: [WrenchWire; MAX_HANDS_OF_TEAM],
+        /// Reference generalized force h_r.
+        pub generalized_force_ref: [WrenchWire; MAX_HANDS_OF_TEAM],
+        /// Measured object pose by the mean of the virtual sticks' tips (eq. 27).
+        pub object_pose: PoseWire,
+        /// Reference object pose.
+        pub object_pose_ref: PoseWire,
+        /// One of [`mode`].
+        pub team_mode: u64,
+    }
+}
+
+payload! {
+    /// bridge → observers: the object as it truly is.
+    Observers "object-truth"
+    pub struct ObjectTruth {
+        /// True pose in the world.
+        pub pose: PoseWire,
+        /// True twist in the world.
+        pub twist: TwistWire,
+        /// Contacts of this tick that nobody intended (robot-robot, self, robot-object, object-floor).
+        pub unintended_contacts: u64,
+        /// Geom ids of the first of them, plus one; 0 where there is none.
+        pub unintended_pair: [u64; 2],
+        /// Robots in the team, for readers of the log.
+        pub robot_count: u64,
+    }
+}
+
+payload! {
+    /// bridge → observers: robot r as it truly is.
+    Observers "robot-truth"
+    pub struct RobotTruth {
+        /// True base pose in the world.
+        pub base_pose: PoseWire,
+        /// True sole poses in the world.
+        pub sole_pose: [PoseWire; MAX_FEET],
+        /// True wrench of the ground on each foot, averaged over the last tick, about the world origin.
+        pub ground_wrench: [WrenchWire; MAX_FEET],
+        /// True wrench that each hand applies to the object, at the hand's origin, in world axes,
+        /// unfiltered, from the constraint (weld) or the spring itself.
+        pub hand_wrench: [WrenchWire; MAX_HANDS],
+        /// True hand poses in the world.
+        pub hand_pose: [PoseWire; MAX_HANDS],
+        /// True joint angles.
+        pub joint_position_rad: [f64; MAX_JOINTS],
+        /// Largest torque that each drive asked for in this tick, before its limit.
+        pub joint_torque_peak_nm: [f64; MAX_JOINTS],
+        /// Bit j: drive j stood at its torque limit in this tick.
+        pub saturated_joints: u64,
+        /// True centre of mass in the world.
+        pub com_position_m: [f64; 3],
+        /// True centre of pressure of all ground contact, averaged over the last tick.
+        pub zmp_position_m: [f64; 2],
+        /// Distance from it to the edge of the hull of the feet that bear more than 5 % of the weight.
+        pub zmp_margin_m: f64,
+        /// Tilt of the base from upright.
+        pub tilt_rad: f64,
+        /// 1 once the robot has fallen.
+        pub fallen: u64,
+    }
+}
+
+const _: () = assert!(MAX_JOINTS <= 64, "joint sets travel as 64-bit masks");
+const _: () = assert!(MAX_ROBOTS * MAX_HANDS == MAX_HANDS_OF_TEAM);

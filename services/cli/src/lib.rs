@@ -1,0 +1,1 @@
+//! The mikoshi command: run, plan, status, doctor.

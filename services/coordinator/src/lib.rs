@@ -1,0 +1,1 @@
+//! The team's controller: one process, pure tick.

@@ -1,0 +1,1 @@
+//! The physical world: MuJoCo behind Mikoshi's frames.

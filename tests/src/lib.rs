@@ -1,0 +1,1 @@
+//! Closed-loop, determinism, fault and conformance tests across processes.
