@@ -4,7 +4,9 @@
 //! and no robot kinematics; it reads files, and nothing else of the outside.
 
 pub mod robot;
+pub mod run;
 pub mod scenario;
 
 pub use robot::RobotConfig;
+pub use run::{RobotSpec, RunSpec};
 pub use scenario::Scenario;
