@@ -1,0 +1,32 @@
+# `make demo` and `make test` do all the set-up they need: a checkout, cargo, a C compiler and python3
+# suffice. One build profile serves everything, so a clean checkout compiles its dependencies once.
+
+CARGO ?= cargo
+.DEFAULT_GOAL := help
+.PHONY: help setup build demo test bench lint
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: ## Fetch MuJoCo's library (once) into .mujoco/lib
+	@command -v $(CARGO) >/dev/null || { echo "make: cargo is missing: see https://rustup.rs" >&2; exit 1; }
+	@command -v cc >/dev/null || { echo "make: a C compiler (cc) is missing" >&2; exit 1; }
+	@scripts/setup-mujoco
+
+build: setup ## Build target/release/mikoshi and the services beside it
+	$(CARGO) build --release --workspace --bins
+
+demo: build ## Four robots hold one object while the internal forces go to zero
+	target/release/mikoshi run config/scenarios/hold.toml
+
+test: build ## Run every test
+	$(CARGO) test --release --workspace
+
+bench: setup ## Run the benchmarks
+	$(CARGO) bench --workspace
+
+lint: setup ## Formatting, clippy, and dependency rules where cargo-deny is installed
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
+	@if $(CARGO) deny --version >/dev/null 2>&1; then $(CARGO) deny --all-features check; \
+	else echo "lint: cargo-deny is not installed, dependency rules are not checked"; fi
