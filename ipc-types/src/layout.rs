@@ -11,11 +11,44 @@ pub enum Audience {
     Observers,
 }
 
+/// What a payload is made of: nothing else travels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    /// `f64`; receivers check that it is finite.
+    Float,
+    /// `u64`: counts, ticks, flags and modes.
+    Integer,
+}
+
+/// A type that fields may have. Implemented for `f64`, `u64` and arrays of them: an invalid `bool` or
+/// enum would be undefined behaviour before any check.
+pub trait WireType: Pod {
+    /// What it consists of.
+    const SCALAR: Scalar;
+}
+
+impl WireType for f64 {
+    const SCALAR: Scalar = Scalar::Float;
+}
+
+impl WireType for u64 {
+    const SCALAR: Scalar = Scalar::Integer;
+}
+
+impl<T: WireType, const N: usize> WireType for [T; N]
+where
+    [T; N]: Pod,
+{
+    const SCALAR: Scalar = T::SCALAR;
+}
+
 /// One field of a payload, for those who name a differing byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// The field's name, which ends in its unit.
     pub name: &'static str,
+    /// What it consists of.
+    pub scalar: Scalar,
     /// Offset from the payload's start.
     pub offset_bytes: usize,
     /// Size in the payload.
@@ -34,8 +67,8 @@ pub trait Payload: Pod + PartialEq + core::fmt::Debug + Send + Sync {
     const FIELDS: &'static [Field];
     /// Who may read it.
     const AUDIENCE: Audience;
-    /// Hash of the definition and of the limits: two builds exchange frames only if it agrees.
-    const SCHEMA_HASH: u64 = schema_hash(Self::NAME, Self::DEFINITION, size_of::<Self>());
+    /// Hash of the definition and of the layout: two builds exchange frames only if it agrees.
+    const SCHEMA_HASH: u64 = schema_hash(Self::NAME, Self::DEFINITION, Self::FIELDS);
     /// Type name on the wire; it carries the schema hash, since iceoryx2 rejects another size but
     /// would accept another layout under the same name.
     const TYPE_NAME: &'static str;
@@ -46,18 +79,36 @@ pub trait Payload: Pod + PartialEq + core::fmt::Debug + Send + Sync {
             .iter()
             .find(|field| (field.offset_bytes..field.offset_bytes + field.size_bytes).contains(&offset_bytes))
     }
+
+    /// The first field that holds a NaN or an infinity.
+    fn first_non_finite(&self) -> Option<&'static Field> {
+        const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+        let words: &[u64] = bytemuck::cast_slice(bytemuck::bytes_of(self));
+        Self::FIELDS.iter().filter(|field| field.scalar == Scalar::Float).find(|field| {
+            let start = field.offset_bytes / size_of::<f64>();
+            let words = words.get(start..start + field.size_bytes / size_of::<f64>()).unwrap_or_default();
+            // No early exit, so that it vectorises: all values are finite in all frames but the last.
+            words.iter().fold(false, |found, word| found | (word & EXPONENT == EXPONENT))
+        })
+    }
 }
 
 /// A payload that services may subscribe to. Ground truth does not implement it, so that a service
 /// which reads ground truth does not compile.
 pub trait ServicePayload: Payload {}
 
-/// FNV-1a over name, definition and size.
-pub const fn schema_hash(name: &str, definition: &str, size_bytes: usize) -> u64 {
+/// FNV-1a over name, definition, and offset and size of every field. The latter two tell layouts apart
+/// whose definition reads the same, such as `[f64; MAX_JOINTS]` under another limit.
+pub const fn schema_hash(name: &str, definition: &str, fields: &[Field]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-    let hash = fnv1a(OFFSET, name.as_bytes());
-    let hash = fnv1a(hash, definition.as_bytes());
-    fnv1a(hash, &(size_bytes as u64).to_le_bytes())
+    let mut hash = fnv1a(fnv1a(OFFSET, name.as_bytes()), definition.as_bytes());
+    let mut i = 0;
+    while i < fields.len() {
+        hash = fnv1a(hash, &(fields[i].offset_bytes as u64).to_le_bytes());
+        hash = fnv1a(hash, &(fields[i].size_bytes as u64).to_le_bytes());
+        i += 1;
+    }
+    hash
 }
 
 const fn fnv1a(mut hash: u64, bytes: &[u8]) -> u64 {
@@ -113,6 +164,7 @@ macro_rules! payload {
             const DEFINITION: &'static str = concat!($( stringify!($field), ":", stringify!($type), ";" ),*);
             const FIELDS: &'static [$crate::Field] = &[$( $crate::Field {
                 name: stringify!($field),
+                scalar: <$type as $crate::WireType>::SCALAR,
                 offset_bytes: core::mem::offset_of!($name, $field),
                 size_bytes: size_of::<$type>(),
             } ),*];
@@ -126,6 +178,12 @@ macro_rules! payload {
                 }
             };
         }
+
+        const _: () = assert!(
+            size_of::<$crate::Frame<$name>>() == size_of::<$crate::Envelope>() + size_of::<$name>()
+                && core::mem::offset_of!($crate::Frame<$name>, payload) == size_of::<$crate::Envelope>(),
+            "a frame is its envelope and its payload, without padding"
+        );
 
         $crate::layout::payload!(@audience $audience $name);
     };

@@ -1,0 +1,445 @@
+//! The schedule of a tick, as data: who waits for what, in which order, on which core.
+//!
+//! Every runner executes it, every transport connects by it, `mikoshi plan` prints it.
+
+use crate::Topic;
+use core::fmt;
+use mikoshi_ipc_types::{
+    Audience, JointCommand, MAX_ROBOTS, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, ServiceId,
+    TeamCommand, TeamState,
+};
+
+/// What a service does in a phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Call {
+    /// Bridge: read the world, publish sensors and ground truth.
+    Publish,
+    /// Servo: estimate, publish the robot's state.
+    Sense,
+    /// Coordinator: run the law, publish commands.
+    Coordinate,
+    /// Servo: run gait and inverse kinematics, publish joint commands.
+    Act,
+    /// Bridge: advance the world to the next tick.
+    Step,
+}
+
+impl fmt::Display for Call {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Publish => "publish",
+            Self::Sense => "sense",
+            Self::Coordinate => "coordinate",
+            Self::Act => "act",
+            Self::Step => "step",
+        })
+    }
+}
+
+/// A frame that a phase waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// The frame.
+    pub topic: Topic,
+    /// Its publisher.
+    pub from: ServiceId,
+    /// In tick k the phase uses the frame of tick k − age.
+    pub age_ticks: u64,
+}
+
+impl Input {
+    /// The tick of the frame that is used in `tick`; none in the first `age_ticks` ticks, in which the
+    /// consumer holds its initial command.
+    pub fn tick_at(&self, tick: u64) -> Option<u64> {
+        tick.checked_sub(self.age_ticks)
+    }
+}
+
+/// A frame that a phase publishes, one a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// The frame.
+    pub topic: Topic,
+    /// Who may read it.
+    pub audience: Audience,
+    /// Its payload's size.
+    pub size_bytes: usize,
+}
+
+impl Output {
+    fn of<P: Payload>(robot: usize) -> Self {
+        Self { topic: Topic::of::<P>(robot), audience: P::AUDIENCE, size_bytes: size_of::<P>() }
+    }
+}
+
+/// One call of one service.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phase {
+    /// Who.
+    pub service: ServiceId,
+    /// What.
+    pub call: Call,
+    /// What it waits for.
+    pub inputs: Vec<Input>,
+    /// What it publishes.
+    pub outputs: Vec<Output>,
+    /// The core it runs on; the operating system's choice when absent.
+    pub core: Option<usize>,
+    /// Share of the control period that it may take.
+    pub budget: f64,
+}
+
+/// Cores by service. Empty leaves the choice to the operating system.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Placement {
+    /// Core of the bridge.
+    pub bridge_core: Option<usize>,
+    /// Core of the coordinator.
+    pub coordinator_core: Option<usize>,
+    /// Cores of the servos, in turn.
+    pub servo_cores: Vec<usize>,
+}
+
+impl Placement {
+    /// The core of this service.
+    pub fn core_of(&self, service: ServiceId) -> Option<usize> {
+        match service {
+            ServiceId::Bridge => self.bridge_core,
+            ServiceId::Coordinator => self.coordinator_core,
+            ServiceId::Servo(robot) => {
+                robot.checked_rem(self.servo_cores.len()).map(|index| self.servo_cores[index])
+            }
+        }
+    }
+}
+
+/// Why a list of phases is not a schedule.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum ScheduleError {
+    #[error("a team has 1 to {MAX_ROBOTS} robots, not {0}")]
+    TeamSize(usize),
+    #[error("a coordination delay is at most {MAX_AGE_TICKS} ticks, not {0}")]
+    Age(u64),
+    #[error("{0} is published twice in a tick")]
+    PublishedTwice(Topic),
+    #[error("{service} waits for {topic}, which {from} does not publish")]
+    NotPublished { service: ServiceId, topic: Topic, from: ServiceId },
+    #[error("{service} waits for {topic} of the same tick, which {from} publishes only later")]
+    PublishedTooLate { service: ServiceId, topic: Topic, from: ServiceId },
+    #[error("{service} has {call} twice in a tick")]
+    CalledTwice { service: ServiceId, call: Call },
+}
+
+/// The oldest command that can be scheduled: it bounds the queues. Loops with more delay than this
+/// have no usable gain left.
+pub const MAX_AGE_TICKS: u64 = 16;
+
+/// The phases of a tick in canonical order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TickSchedule {
+    phases: Vec<Phase>,
+}
+
+impl TickSchedule {
+    /// Publish → sense of each robot → coordinate → act of each robot → step.
+    ///
+    /// `coordination_delay_ticks` is the age of the team command that a servo uses: 0 in lockstep.
+    ///
+    /// # Errors
+    /// A team without robots or with more than [`MAX_ROBOTS`]; a delay above [`MAX_AGE_TICKS`].
+    pub fn of_team(
+        robots: usize,
+        coordination_delay_ticks: u64,
+        placement: &Placement,
+    ) -> Result<Self, ScheduleError> {
+        if !(1..=MAX_ROBOTS).contains(&robots) {
+            return Err(ScheduleError::TeamSize(robots));
+        }
+        let (bridge, coordinator) = (ServiceId::Bridge, ServiceId::Coordinator);
+        let phase = |service, call, budget, inputs, outputs| Phase {
+            service,
+            call,
+            inputs,
+            outputs,
+            core: placement.core_of(service),
+            budget,
+        };
+        let input = |topic, from| Input { topic, from, age_ticks: 0 };
+
+        let mut phases = Vec::with_capacity(2 * robots + 3);
+        let mut published: Vec<_> = (0..robots).map(Output::of::<Sensors>).collect();
+        published.extend((0..robots).map(Output::of::<RobotTruth>));
+        published.push(Output::of::<ObjectTruth>(0));
+        // The budgets share out one period along the critical path, on which all servos run at once;
+        // physics takes most of it.
+        phases.push(phase(bridge, Call::Publish, 0.05, vec![], published));
+        phases.extend((0..robots).map(|r| {
+            phase(
+                ServiceId::Servo(r),
+                Call::Sense,
+                0.1,
+                vec![input(Topic::of::<Sensors>(r), bridge)],
+                vec![Output::of::<RobotState>(r)],
+            )
+        }));
+        let mut commands: Vec<_> = (0..robots).map(Output::of::<TeamCommand>).collect();
+        commands.push(Output::of::<TeamState>(0));
+        phases.push(phase(
+            coordinator,
+            Call::Coordinate,
+            0.1,
+            (0..robots).map(|r| input(Topic::of::<RobotState>(r), ServiceId::Servo(r))).collect(),
+            commands,
+        ));
+        phases.extend((0..robots).map(|r| {
+            let command = Input {
+                topic: Topic::of::<TeamCommand>(r),
+                from: coordinator,
+                age_ticks: coordination_delay_ticks,
+            };
+            phase(ServiceId::Servo(r), Call::Act, 0.25, vec![command], vec![Output::of::<JointCommand>(r)])
+        }));
+        phases.push(phase(
+            bridge,
+            Call::Step,
+            0.5,
+            (0..robots).map(|r| input(Topic::of::<JointCommand>(r), ServiceId::Servo(r))).collect(),
+            vec![],
+        ));
+        Self::new(phases)
+    }
+
+    /// A schedule of these phases, in this order.
+    ///
+    /// # Errors
+    /// An input that has no producer, or whose producer comes later in the same tick; a topic that is
+    /// published twice; a call that a service has twice; an age above [`MAX_AGE_TICKS`].
+    pub fn new(phases: Vec<Phase>) -> Result<Self, ScheduleError> {
+        for (index, phase) in phases.iter().enumerate() {
+            let (service, call) = (phase.service, phase.call);
+            if phases[..index].iter().any(|other| (other.service, other.call) == (service, call)) {
+                return Err(ScheduleError::CalledTwice { service, call });
+            }
+            for &Input { topic, from, age_ticks } in &phase.inputs {
+                if age_ticks > MAX_AGE_TICKS {
+                    return Err(ScheduleError::Age(age_ticks));
+                }
+                let produces =
+                    |p: &Phase| p.service == from && p.outputs.iter().any(|output| output.topic == topic);
+                match phases.iter().position(produces) {
+                    None => return Err(ScheduleError::NotPublished { service, topic, from }),
+                    Some(producer) if age_ticks == 0 && producer >= index => {
+                        return Err(ScheduleError::PublishedTooLate { service, topic, from });
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+        let schedule = Self { phases };
+        let mut topics: Vec<_> = schedule.outputs().map(|(_, output)| output.topic).collect();
+        topics.sort_unstable();
+        match topics.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(ScheduleError::PublishedTwice(pair[0])),
+            None => Ok(schedule),
+        }
+    }
+
+    /// The phases in canonical order.
+    pub fn phases(&self) -> &[Phase] {
+        &self.phases
+    }
+
+    /// The phases of one service, in order.
+    pub fn phases_of(&self, service: ServiceId) -> impl Iterator<Item = &Phase> {
+        self.phases.iter().filter(move |phase| phase.service == service)
+    }
+
+    /// The services in the order in which they first appear in a tick.
+    pub fn services(&self) -> Vec<ServiceId> {
+        let mut services = Vec::new();
+        for phase in &self.phases {
+            if !services.contains(&phase.service) {
+                services.push(phase.service);
+            }
+        }
+        services
+    }
+
+    /// All frames of a tick with their publishers, in canonical order: the order of a run's identity.
+    pub fn outputs(&self) -> impl Iterator<Item = (ServiceId, &Output)> {
+        self.phases.iter().flat_map(|phase| phase.outputs.iter().map(move |output| (phase.service, output)))
+    }
+
+    /// Who publishes this topic.
+    pub fn producer_of(&self, topic: Topic) -> Option<ServiceId> {
+        self.outputs().find(|(_, output)| output.topic == topic).map(|(service, _)| service)
+    }
+
+    /// Who waits for this topic, and how old a frame each uses.
+    pub fn consumers_of(&self, topic: Topic) -> impl Iterator<Item = (ServiceId, &Input)> {
+        self.phases.iter().flat_map(move |phase| {
+            phase
+                .inputs
+                .iter()
+                .filter(move |input| input.topic == topic)
+                .map(move |input| (phase.service, input))
+        })
+    }
+
+    /// The input of a service by this topic.
+    pub fn input_of(&self, service: ServiceId, topic: Topic) -> Option<&Input> {
+        self.consumers_of(topic).find(|(consumer, _)| *consumer == service).map(|(_, input)| input)
+    }
+}
+
+impl fmt::Display for TickSchedule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fn list(items: impl Iterator<Item = String>) -> String {
+            let items: Vec<_> = items.collect();
+            if items.is_empty() { "-".into() } else { items.join(" ") }
+        }
+        let rows: Vec<[String; 6]> = self
+            .phases
+            .iter()
+            .map(|phase| {
+                let input = |input: &Input| match input.age_ticks {
+                    0 => input.topic.to_string(),
+                    age => format!("{}@k-{age}", input.topic),
+                };
+                [
+                    phase.service.to_string(),
+                    phase.call.to_string(),
+                    phase.core.map_or("any".into(), |core| core.to_string()),
+                    format!("{:.0} %", 100.0 * phase.budget),
+                    list(phase.inputs.iter().map(input)),
+                    list(phase.outputs.iter().map(|output| output.topic.to_string())),
+                ]
+            })
+            .collect();
+        let titles = ["service", "call", "core", "budget", "waits for", "publishes"].map(String::from);
+        let width = |column: usize| {
+            rows.iter().chain([&titles]).map(|row| row[column].len()).max().unwrap_or_default()
+        };
+        let widths: [usize; 6] = core::array::from_fn(width);
+        for row in core::iter::once(&titles).chain(&rows) {
+            let line = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}"));
+            writeln!(f, "{}", line.collect::<Vec<_>>().join("  ").trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn team_of(robots: usize, delay_ticks: u64) -> TickSchedule {
+        TickSchedule::of_team(robots, delay_ticks, &Placement::default()).expect("a valid team")
+    }
+
+    #[test]
+    fn a_tick_runs_from_sensors_to_physics() {
+        let schedule = team_of(2, 0);
+        let order: Vec<_> =
+            schedule.phases().iter().map(|phase| format!("{} {}", phase.service, phase.call)).collect();
+        assert_eq!(
+            order,
+            [
+                "bridge publish",
+                "servo-0 sense",
+                "servo-1 sense",
+                "coordinator coordinate",
+                "servo-0 act",
+                "servo-1 act",
+                "bridge step"
+            ]
+        );
+        assert_eq!(schedule.phases_of(ServiceId::Servo(1)).count(), 2);
+        assert_eq!(schedule.services().len(), 4);
+    }
+
+    #[test]
+    fn every_topic_of_every_team_has_one_producer() {
+        for robots in 1..=MAX_ROBOTS {
+            let schedule = team_of(robots, 0);
+            for (service, output) in schedule.outputs() {
+                assert_eq!(schedule.producer_of(output.topic), Some(service));
+            }
+            assert_eq!(schedule.outputs().count(), 5 * robots + 2);
+        }
+    }
+
+    #[test]
+    fn ground_truth_and_the_team_state_have_no_consumer() {
+        let schedule = team_of(3, 0);
+        for (_, output) in schedule.outputs() {
+            let consumed = schedule.consumers_of(output.topic).count() > 0;
+            assert_eq!(consumed, output.audience == Audience::Everyone, "{}", output.topic);
+        }
+    }
+
+    #[test]
+    fn servos_use_a_command_of_the_scheduled_age() {
+        let schedule = team_of(2, 3);
+        let input = schedule.input_of(ServiceId::Servo(1), Topic::of::<TeamCommand>(1)).expect("an input");
+        assert_eq!(input.tick_at(2), None);
+        assert_eq!(input.tick_at(3), Some(0));
+        assert!(schedule.to_string().contains("team-command[1]@k-3"));
+    }
+
+    #[test]
+    fn an_input_without_a_producer_is_rejected() {
+        let mut phases = team_of(2, 0).phases().to_vec();
+        phases[1].outputs.clear();
+        assert!(matches!(TickSchedule::new(phases), Err(ScheduleError::NotPublished { .. })));
+    }
+
+    #[test]
+    fn an_input_of_the_same_tick_must_be_published_earlier_in_it() {
+        let mut phases = team_of(2, 0).phases().to_vec();
+        phases.swap(1, 3);
+        assert!(matches!(TickSchedule::new(phases), Err(ScheduleError::PublishedTooLate { .. })));
+        // A command of the tick before may come later in the tick.
+        let mut phases = team_of(2, 1).phases().to_vec();
+        phases.swap(3, 4);
+        assert!(TickSchedule::new(phases).is_ok());
+    }
+
+    #[test]
+    fn a_topic_has_one_publisher_and_a_service_one_phase_by_call() {
+        let mut phases = team_of(2, 0).phases().to_vec();
+        let twice = phases[1].outputs[0];
+        phases[2].outputs.push(twice);
+        assert_eq!(TickSchedule::new(phases), Err(ScheduleError::PublishedTwice(twice.topic)));
+
+        let mut phases = team_of(2, 0).phases().to_vec();
+        phases.push(phases[0].clone());
+        assert!(matches!(TickSchedule::new(phases), Err(ScheduleError::CalledTwice { .. })));
+    }
+
+    #[test]
+    fn team_size_and_delay_are_bounded() {
+        let of_team = |robots, delay| TickSchedule::of_team(robots, delay, &Placement::default());
+        assert_eq!(of_team(0, 0), Err(ScheduleError::TeamSize(0)));
+        assert_eq!(of_team(MAX_ROBOTS + 1, 0), Err(ScheduleError::TeamSize(MAX_ROBOTS + 1)));
+        assert_eq!(of_team(4, MAX_AGE_TICKS + 1), Err(ScheduleError::Age(MAX_AGE_TICKS + 1)));
+    }
+
+    #[test]
+    fn servos_take_their_cores_in_turn() {
+        let placement = Placement { bridge_core: Some(0), coordinator_core: None, servo_cores: vec![2, 3] };
+        let schedule = TickSchedule::of_team(3, 0, &placement).expect("a valid team");
+        let core = |service| schedule.phases_of(service).next().and_then(|phase| phase.core);
+        assert_eq!(core(ServiceId::Bridge), Some(0));
+        assert_eq!(core(ServiceId::Coordinator), None);
+        assert_eq!([0, 1, 2].map(|r| core(ServiceId::Servo(r))), [Some(2), Some(3), Some(2)]);
+    }
+
+    #[test]
+    fn budgets_along_the_critical_path_share_out_one_period() {
+        let schedule = team_of(1, 0);
+        let total: f64 = schedule.phases().iter().map(|phase| phase.budget).sum();
+        assert!((total - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,139 @@
+//! How frames travel: one contract, [in memory](memory) in one thread and over iceoryx2
+//! between processes.
+//!
+//! A service can subscribe to its inputs only. Ground truth is for observers, and this does not
+//! compile:
+//!
+//! ```compile_fail,E0277
+//! use mikoshi_ipc_types::{ObjectTruth, ServiceId};
+//! use mikoshi_runtime::{InMemoryHub, Placement, TickSchedule, Transport};
+//!
+//! let hub = InMemoryHub::new(TickSchedule::of_team(4, 0, &Placement::default()).unwrap());
+//! let transport = hub.transport(ServiceId::Coordinator);
+//! let truth = transport.subscriber::<ObjectTruth>(0);
+//! ```
+//!
+//! The same with an input does:
+//!
+//! ```
+//! use mikoshi_ipc_types::{RobotState, ServiceId};
+//! use mikoshi_runtime::{InMemoryHub, Placement, TickSchedule, Transport};
+//!
+//! let hub = InMemoryHub::new(TickSchedule::of_team(4, 0, &Placement::default()).unwrap());
+//! let transport = hub.transport(ServiceId::Coordinator);
+//! let state = transport.subscriber::<RobotState>(0).unwrap();
+//! ```
+
+mod accept;
+pub mod memory;
+
+use crate::{TickError, Topic};
+use mikoshi_ipc_types::{Frame, Payload, ServiceId, ServicePayload};
+
+/// Ticks that an observer may fall behind before it loses frames.
+pub const OBSERVER_DEPTH: usize = 64;
+
+/// The ports of one service.
+pub trait Transport {
+    /// Publishes `P`.
+    type Publisher<P: Payload>: Publisher<P>;
+    /// Receives `P`.
+    type Subscriber<P: ServicePayload>: Subscriber<P>;
+
+    /// A publisher of `P` about this robot (0 for payloads of the team).
+    ///
+    /// # Errors
+    /// The schedule does not name it as an output of the service; the transport has no room for it.
+    fn publisher<P: Payload>(&self, robot: usize) -> Result<Self::Publisher<P>, ConnectError>;
+
+    /// A subscriber to `P` about this robot (0 for payloads of the team).
+    ///
+    /// # Errors
+    /// The schedule does not name it as an input of the service; the transport has no room for it.
+    fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<Self::Subscriber<P>, ConnectError>;
+}
+
+/// The ports of an observer: any payload, ground truth included; it publishes nothing.
+pub trait Tap {
+    /// Observes `P`.
+    type Observer<P: Payload>: Observer<P>;
+
+    /// An observer of `P` about this robot (0 for payloads of the team).
+    ///
+    /// # Errors
+    /// Nobody publishes it; the transport has no room for it.
+    fn observer<P: Payload>(&self, robot: usize) -> Result<Self::Observer<P>, ConnectError>;
+}
+
+/// Publishes one frame a tick.
+pub trait Publisher<P: Payload> {
+    /// A frame on its way.
+    type Loan<'a>: Loan<P>
+    where
+        Self: 'a;
+
+    /// A zeroed frame for this tick, to be filled in place.
+    ///
+    /// # Errors
+    /// [`TickError::PublisherFull`].
+    fn loan(&mut self, tick: u64) -> Result<Self::Loan<'_>, TickError>;
+}
+
+/// A frame that has been loaned, and is to be filled and sent. What is dropped is not sent.
+pub trait Loan<P: Payload> {
+    /// The payload, zeroed at first.
+    fn payload_mut(&mut self) -> &mut P;
+
+    /// Publishes the frame.
+    ///
+    /// # Errors
+    /// [`TickError::TransportFailed`].
+    fn send(self) -> Result<(), TickError>;
+}
+
+/// Receives the frames of one topic, tick by tick.
+pub trait Subscriber<P: Payload> {
+    /// Waits for the frame of exactly this tick and copies it to `frame`. Frames of earlier ticks and
+    /// of earlier epochs are dropped.
+    ///
+    /// # Errors
+    /// The frame does not come, or is not of this schema, robot, epoch and tick, or holds a value that
+    /// is not finite. Then `frame` is as it was.
+    fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError>;
+}
+
+/// Sees every frame of one topic, as it is: nothing is checked but that it can be read.
+pub trait Observer<P: Payload> {
+    /// The next frame in order, if there is one.
+    ///
+    /// # Errors
+    /// [`TickError::WrongSchema`], [`TickError::TransportFailed`].
+    fn try_receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError>;
+}
+
+/// Why a port could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ConnectError {
+    /// The schedule has no such output.
+    #[error("{service} does not publish {topic} by the schedule")]
+    NotAnOutput {
+        /// Who asked.
+        service: ServiceId,
+        /// For what.
+        topic: Topic,
+    },
+    /// The schedule has no such input.
+    #[error("{service} does not wait for {topic} by the schedule")]
+    NotAnInput {
+        /// Who asked.
+        service: ServiceId,
+        /// For what.
+        topic: Topic,
+    },
+    /// Nobody publishes what is to be observed.
+    #[error("nobody publishes {topic} by the schedule")]
+    NotPublished {
+        /// What.
+        topic: Topic,
+    },
+}
