@@ -2,11 +2,28 @@
 //!
 //! This crate turns files that people write into values that services can trust. It knows no control
 //! and no robot kinematics; it reads files, and nothing else of the outside.
+//!
+//! ```text
+//! config/scenarios/NAME.toml ─┐ over
+//! config/teams/TEAM.toml ─────┤        ──▶ Scenario ─┐
+//! --set key=value, --seed ────┘ under                ├─▶ RunSpec ──▶ one file that every service reads
+//! config/robots/MODEL.toml, its URDF ──▶ RobotConfig ┘
+//! ```
 
+mod decode;
+mod document;
+mod error;
+mod load;
+mod nearest;
+mod origin;
 pub mod robot;
 pub mod run;
 pub mod scenario;
+mod validate;
 
+pub use error::{KeyError, LoadConfigError};
+pub use load::{LoadedRobot, LoadedScenario, load_robot, load_scenario};
+pub use origin::Origin;
 pub use robot::RobotConfig;
-pub use run::{RobotSpec, RunSpec};
+pub use run::{DecodeRunError, RobotSpec, RunSpec};
 pub use scenario::Scenario;

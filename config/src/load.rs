@@ -1,0 +1,182 @@
+//! Reading scenarios and robots: files, overrides, checks.
+
+use crate::decode::decode;
+use crate::document::Node;
+use crate::document::Value;
+use crate::error::{KeyError, LoadConfigError};
+use crate::nearest::did_you_mean;
+use crate::origin::Origin;
+use crate::robot::RobotConfig;
+use crate::scenario::Scenario;
+use crate::validate::{self, Violation};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A scenario with the robots that it names, and the places where every key was written.
+#[derive(Clone, Debug)]
+pub struct LoadedScenario {
+    /// The scenario: team beneath, overrides on top, checked.
+    pub scenario: Scenario,
+    /// Its robots' models, by name.
+    pub models: BTreeMap<String, LoadedRobot>,
+    document: Node,
+}
+
+/// A robot model and its URDF.
+#[derive(Clone, Debug)]
+pub struct LoadedRobot {
+    /// The model.
+    pub config: RobotConfig,
+    /// The text of its URDF.
+    pub urdf: String,
+    /// Where that text was read.
+    pub urdf_path: PathBuf,
+    document: Node,
+}
+
+impl LoadedScenario {
+    /// An error about a key that only its user can judge, such as a row of C that depends on others:
+    /// `problem` says what was found and what was expected.
+    pub fn error_at(&self, key: &str, problem: impl Into<String>) -> LoadConfigError {
+        self.document.key_error(key, problem).into()
+    }
+}
+
+impl LoadedRobot {
+    /// An error about a key that only its user can judge, such as a link that the URDF lacks: `problem`
+    /// says what was found and what was expected.
+    pub fn error_at(&self, key: &str, problem: impl Into<String>) -> LoadConfigError {
+        self.document.key_error(key, problem).into()
+    }
+}
+
+/// Loads `DIR/scenarios/NAME.toml`, the team that it names from `DIR/teams` beneath it, `overrides` and
+/// `seed` above it, and the robots from `DIR/robots`.
+///
+/// An override is a key's full path and a value: TOML, or a string that needs no quotes. An empty value
+/// takes the key away: `("hybrid.start_s", "")` leaves hybrid control off.
+pub fn load_scenario(
+    path: &Path,
+    overrides: &[(String, String)],
+    seed: Option<u64>,
+) -> Result<LoadedScenario, LoadConfigError> {
+    let mut document = Node::read(path)?;
+    // The team first: what lies beneath depends on it.
+    for (key, value) in overrides.iter().filter(|(key, _)| key == "team") {
+        apply(&mut document, key, value)?;
+    }
+    if let Some(Value::String(team)) = document.get("team").map(|node| &node.value) {
+        let team =
+            find(&sibling(path, "teams"), team).map_err(|problem| document.key_error("team", problem))?;
+        document = document.over(Node::read(&team)?);
+    }
+    for (key, value) in overrides.iter().filter(|(key, _)| key != "team") {
+        apply(&mut document, key, value)?;
+    }
+    if let Some(seed) = seed {
+        let value = Value::Integer(seed.into());
+        document.set("seed", Node { origin: Origin::Option(format!("--seed {seed}").into()), value })?;
+    }
+
+    let scenario: Scenario = decode(&document)?;
+    let models = load_models(&sibling(path, "robots"), &scenario, &document)?;
+    let configs: Vec<_> = scenario.robots.iter().map(|member| &models[&member.model].config).collect();
+    refuse(&document, validate::scenario(&scenario, &configs))?;
+    Ok(LoadedScenario { scenario, models, document })
+}
+
+/// Loads the robot `model` and its URDF from the folder `dir`.
+pub fn load_robot(dir: &Path, model: &str) -> Result<LoadedRobot, LoadConfigError> {
+    let path = find(dir, model).map_err(|problem| KeyError {
+        origin: Origin::File(dir.into()),
+        key: "model".to_owned(),
+        problem,
+    })?;
+    let document = Node::read(&path)?;
+    let config: RobotConfig = decode(&document)?;
+    refuse(&document, validate::robot(&config, model))?;
+    for (name, folder) in &config.packages {
+        if !dir.join(folder).is_dir() {
+            let problem = format!("found {folder:?}, expected a folder beside this file");
+            return Err(document.key_error(&format!("packages.{name}"), problem).into());
+        }
+    }
+    let urdf_path = dir.join(&config.urdf);
+    let urdf = fs::read_to_string(&urdf_path).map_err(|error| {
+        let problem = format!("found {:?}, expected a file beside this one: {error}", config.urdf);
+        document.key_error("urdf", problem)
+    })?;
+    Ok(LoadedRobot { config, urdf, urdf_path, document })
+}
+
+fn load_models(
+    dir: &Path,
+    scenario: &Scenario,
+    document: &Node,
+) -> Result<BTreeMap<String, LoadedRobot>, LoadConfigError> {
+    let mut models = BTreeMap::new();
+    for (index, member) in scenario.robots.iter().enumerate() {
+        if !models.contains_key(&member.model) {
+            find(dir, &member.model)
+                .map_err(|problem| document.key_error(&format!("robots.{index}.model"), problem))?;
+            models.insert(member.model.clone(), load_robot(dir, &member.model)?);
+        }
+    }
+    Ok(models)
+}
+
+fn apply(document: &mut Node, key: &str, value: &str) -> Result<(), LoadConfigError> {
+    let typed = format!("--set {key}={value}");
+    match value {
+        "" => document.unset(key, Origin::Option(typed.into()))?,
+        _ => document.set(key, Node::from_option(&typed, value))?,
+    }
+    Ok(())
+}
+
+fn refuse(document: &Node, violations: Vec<Violation>) -> Result<(), LoadConfigError> {
+    if violations.is_empty() {
+        return Ok(());
+    }
+    let errors =
+        violations.into_iter().map(|violation| document.key_error(&violation.key, violation.problem));
+    Err(LoadConfigError::CheckKeys(errors.collect()))
+}
+
+/// The folder `name` beside the scenario's folder.
+fn sibling(scenario: &Path, name: &str) -> PathBuf {
+    let folder = scenario.parent().unwrap_or(Path::new(""));
+    match folder.file_name() {
+        Some(_) => folder.with_file_name(name),
+        None => folder.join("..").join(name),
+    }
+}
+
+/// `DIR/NAME.toml`, or what is wrong with the name.
+fn find(dir: &Path, name: &str) -> Result<PathBuf, String> {
+    let known = names_in(dir);
+    if known.iter().any(|known| known == name) {
+        return Ok(dir.join(format!("{name}.toml")));
+    }
+    let hint = did_you_mean(name, &known);
+    match known.as_slice() {
+        [] => Err(format!(
+            "found {name:?}, expected {name}.toml in {}, which holds no TOML file",
+            dir.display()
+        )),
+        known => {
+            Err(format!("found {name:?}, expected one of {} in {}{hint}", known.join(", "), dir.display()))
+        }
+    }
+}
+
+/// Names of the TOML files in a folder, sorted; none where there is no folder.
+fn names_in(dir: &Path) -> Vec<String> {
+    let files = fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path());
+    let tomls = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let mut names: Vec<_> =
+        tomls.filter_map(|path| path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned)).collect();
+    names.sort();
+    names
+}

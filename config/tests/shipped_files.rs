@@ -1,0 +1,94 @@
+//! The files that Mikoshi ships load, and say what their comments say.
+
+use mikoshi_config::scenario::{Grasp, Scenario};
+use mikoshi_config::{LoadedScenario, load_scenario};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+fn names_in(name: &str) -> Vec<String> {
+    let files = fs::read_dir(folder(name)).unwrap().map(|entry| entry.unwrap().path());
+    files.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect()
+}
+
+fn load(name: &str, overrides: &[(&str, &str)]) -> LoadedScenario {
+    let overrides: Vec<_> = overrides.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+    let path = folder("scenarios").join(name).with_extension("toml");
+    load_scenario(&path, &overrides, None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Palm centres of the whole team in the world, by the carry positions of the models.
+fn palms(loaded: &LoadedScenario) -> Vec<[f64; 3]> {
+    let of_member = |member: &mikoshi_config::scenario::Member| {
+        let (sin, cos) = member.yaw_deg.to_radians().sin_cos();
+        let hands = loaded.models[&member.model].config.hands.clone();
+        let (x, y) = (member.x_m, member.y_m);
+        hands.into_iter().map(move |hand| {
+            let [ahead, left, up] = hand.carry_position_m;
+            [x + cos * ahead - sin * left, y + sin * ahead + cos * left, up]
+        })
+    };
+    loaded.scenario.robots.iter().flat_map(of_member).collect()
+}
+
+#[test]
+fn every_scenario_is_called_as_its_file() {
+    for name in names_in("scenarios") {
+        assert_eq!(load(&name, &[]).scenario.name, name);
+    }
+}
+
+#[test]
+fn every_team_can_run_the_hold_scenario() {
+    for team in names_in("teams") {
+        let scenario = load("hold", &[("team", &team)]).scenario;
+        assert_eq!(scenario.team, team);
+        assert_eq!(scenario.ticks(), 4400);
+        assert_eq!(scenario.substeps(), 5);
+    }
+}
+
+#[test]
+fn teams_have_as_many_robots_as_they_are_called() {
+    for (team, robots) in [("two", 2), ("three", 3), ("four", 4), ("five", 5), ("eight", 8)] {
+        assert_eq!(load("hold", &[("team", team)]).scenario.robots.len(), robots);
+    }
+}
+
+#[test]
+fn all_palms_of_all_teams_touch_the_objects_long_faces() {
+    for team in names_in("teams") {
+        let loaded = load("hold", &[("team", &team)]);
+        let Scenario { object, .. } = &loaded.scenario;
+        for [x, y, z] in palms(&loaded) {
+            assert!((x.abs() - object.size_m[0] / 2.0).abs() < 1e-9, "{team}: palm at x = {x}");
+            assert!(y.abs() < object.size_m[1] / 2.0, "{team}: palm at y = {y}");
+            assert!((z - object.position_m[2]).abs() < 1e-9, "{team}: palm at z = {z}");
+        }
+    }
+}
+
+#[test]
+fn robots_of_one_side_stand_nine_tenths_of_a_metre_apart_or_further() {
+    for team in names_in("teams") {
+        let robots = load("hold", &[("team", &team)]).scenario.robots;
+        for (i, a) in robots.iter().enumerate() {
+            for b in &robots[..i] {
+                let same_side = a.x_m == b.x_m;
+                assert!(!same_side || (a.y_m - b.y_m).abs() > 0.899, "{team}: {} and {}", a.name, b.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn hold_is_the_papers_section_4_3() {
+    let scenario = load("hold", &[]).scenario;
+    assert_eq!(scenario.hybrid.start_s, Some(10.5));
+    assert_eq!(scenario.object.mass_kg, 3.0);
+    assert_eq!(scenario.object.size_m, [0.6, 1.6, 0.3]);
+    assert_eq!(scenario.grasp, Grasp::Weld { offset_m: 0.002 });
+}
