@@ -1,0 +1,187 @@
+//! Preview control of the cart-table model (Kajita et al., ICRA 2003; Katayama et al. 1985).
+
+use super::riccati::solve_discrete_riccati;
+use crate::balance::GRAVITY_M_S2;
+use nalgebra::{Matrix3, Matrix4, RowVector3, Vector2, Vector3, Vector4};
+
+/// What the gains follow from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreviewConfig {
+    /// Control period \[s\].
+    pub control_period_s: f64,
+    /// Height of the centre of mass over the ground \[m\].
+    pub com_height_m: f64,
+    /// How far the controller looks ahead \[s\].
+    pub horizon_s: f64,
+    /// Qe: weight of the zero moment point's error.
+    pub error_weight: f64,
+    /// R: weight of the jerk's change.
+    pub jerk_weight: f64,
+}
+
+impl Default for PreviewConfig {
+    fn default() -> Self {
+        Self {
+            control_period_s: 0.005,
+            com_height_m: 0.79,
+            horizon_s: 1.6,
+            error_weight: 1.0,
+            jerk_weight: 1e-6,
+        }
+    }
+}
+
+/// Why there are no gains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SolvePreviewError {
+    /// A period, height, horizon or jerk weight that is not positive, or an error weight below zero.
+    #[error("preview control needs positive period, height, horizon and weights")]
+    NotPositive,
+    /// The Riccati equation has no stabilising solution for these numbers.
+    #[error("the Riccati equation of preview control has no stabilising solution")]
+    NoSolution,
+}
+
+/// Centre of mass on its plane, world axes: the cart's state, and the integrated error of the zero
+/// moment point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreviewState {
+    /// c \[m\].
+    pub com: Vector2<f64>,
+    /// ċ \[m/s\].
+    pub com_velocity: Vector2<f64>,
+    /// c̈ \[m/s²\].
+    pub com_acceleration: Vector2<f64>,
+    /// Sum over ticks of (zmp − reference) \[m\].
+    pub error_sum: Vector2<f64>,
+}
+
+impl PreviewState {
+    /// At rest.
+    pub fn at_rest(com: Vector2<f64>) -> Self {
+        let zero = Vector2::zeros();
+        Self { com, com_velocity: zero, com_acceleration: zero, error_sum: zero }
+    }
+}
+
+/// The controller: constant over a run. With x = (c, ċ, c̈) per axis, jerk input u, p = C x,
+/// C = (1, 0, −h/g):
+///
+/// `u(k) = − Gi Σ_{i≤k} (p(i) − p_ref(i)) − Gx x(k) − Σ_{j=1..N} Gp(j) p_ref(k+j)`.
+///
+/// The gains come from the augmented system (p error, Δx), Ã = [1, CA; 0, A], B̃ = [CB; B],
+/// Q̃ = diag(Qe, 0), whose Riccati solution is P:
+/// - Gi = K̃₀, Gx = K̃₁₋₃ with K̃ = (R + B̃ᵀPB̃)⁻¹ B̃ᵀPÃ
+/// - Gp(1) = −Gi, Gp(j) = (R + B̃ᵀPB̃)⁻¹ B̃ᵀ X(j−1), X(1) = −Ãcᵀ P e₁, X(j) = Ãcᵀ X(j−1),
+///   Ãc = Ã − B̃ K̃.
+///
+/// Deviation from the source: the last gain holds the sum of all that lie past the horizon, i.e. the
+/// reference is taken to stay as it is there. That makes the law exactly invariant to where the origin
+/// lies; truncated, it would pull a robot far from the origin towards it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PreviewControl {
+    transition: Matrix3<f64>,
+    input: Vector3<f64>,
+    output: RowVector3<f64>,
+    gain_error: f64,
+    gain_state: RowVector3<f64>,
+    gain_preview: Vec<f64>,
+}
+
+impl PreviewControl {
+    /// Solves for the gains.
+    pub fn new(config: &PreviewConfig) -> Result<Self, SolvePreviewError> {
+        let PreviewConfig { control_period_s: dt, com_height_m, horizon_s, error_weight, jerk_weight } = *config;
+        let positive = [dt, com_height_m, horizon_s, jerk_weight].iter().all(|value| *value > 0.0);
+        if !(positive && error_weight > 0.0) {
+            return Err(SolvePreviewError::NotPositive);
+        }
+        let transition = Matrix3::new(1.0, dt, dt * dt / 2.0, 0.0, 1.0, dt, 0.0, 0.0, 1.0);
+        let input = Vector3::new(dt.powi(3) / 6.0, dt * dt / 2.0, dt);
+        let output = RowVector3::new(1.0, 0.0, -com_height_m / GRAVITY_M_S2);
+
+        let mut a = Matrix4::zeros();
+        a[(0, 0)] = 1.0;
+        a.fixed_view_mut::<1, 3>(0, 1).copy_from(&(output * transition));
+        a.fixed_view_mut::<3, 3>(1, 1).copy_from(&transition);
+        let b = Vector4::new((output * input).x, input.x, input.y, input.z);
+        let q = Matrix4::from_diagonal(&Vector4::new(error_weight, 0.0, 0.0, 0.0));
+        let p = solve_discrete_riccati(&a, &b, &q, jerk_weight).ok_or(SolvePreviewError::NoSolution)?;
+
+        let scale = 1.0 / (jerk_weight + (b.transpose() * p * b).x);
+        let k = b.transpose() * p * a * scale;
+        let closed_transposed = (a - b * k).transpose();
+        let gain_of = |x: &Vector4<f64>| b.dot(x) * scale;
+
+        let samples = (horizon_s / dt).round().max(1.0) as usize;
+        let mut gain_preview = Vec::with_capacity(samples);
+        let mut x = -(p.column(0));
+        for _ in 0..samples {
+            gain_preview.push(gain_of(&x));
+            x = closed_transposed * x;
+        }
+        // Σ_{i≥0} Ãcⁱᵀ x = (I − Ãcᵀ)⁻¹ x; Ãc is stable, so I − Ãcᵀ is regular.
+        let tail = (Matrix4::identity() - closed_transposed).lu().solve(&x).ok_or(SolvePreviewError::NoSolution)?;
+        if let Some(last) = gain_preview.last_mut() {
+            *last += gain_of(&tail);
+        }
+        Ok(Self {
+            transition,
+            input,
+            output,
+            gain_error: k[0],
+            gain_state: k.fixed_view::<1, 3>(0, 1).into_owned(),
+            gain_preview,
+        })
+    }
+
+    /// Gi.
+    pub fn gain_error(&self) -> f64 {
+        self.gain_error
+    }
+
+    /// Gx for (c, ċ, c̈).
+    pub fn gain_state(&self) -> RowVector3<f64> {
+        self.gain_state
+    }
+
+    /// Gp(1), Gp(2), … Gp(N); the last one includes all that would follow.
+    pub fn gain_preview(&self) -> &[f64] {
+        &self.gain_preview
+    }
+
+    /// Zero moment point of the cart-table \[m\].
+    pub fn zmp(&self, state: &PreviewState) -> Vector2<f64> {
+        state.com + state.com_acceleration * self.output.z
+    }
+
+    /// One tick further. `zmp_ref` yields the reference now and then tick by tick; where it ends
+    /// before the horizon does, its last value stays. An empty one holds the state's own zero moment
+    /// point.
+    ///
+    /// Returns the zero moment point's error now \[m\].
+    pub fn advance(
+        &self,
+        state: &mut PreviewState,
+        zmp_ref: impl IntoIterator<Item = Vector2<f64>>,
+    ) -> Vector2<f64> {
+        let zmp = self.zmp(state);
+        let mut zmp_ref = zmp_ref.into_iter();
+        let now = zmp_ref.next().unwrap_or(zmp);
+        let error = zmp - now;
+        state.error_sum += error;
+
+        let (mut ahead, mut preview) = (now, Vector2::zeros());
+        for gain in &self.gain_preview {
+            ahead = zmp_ref.next().unwrap_or(ahead);
+            preview += ahead * *gain;
+        }
+        for axis in 0..2 {
+            let x = Vector3::new(state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]);
+            let jerk = -self.gain_error * state.error_sum[axis] - (self.gain_state * x).x - preview[axis];
+            let next = self.transition * x + self.input * jerk;
+            (state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]) = (next.x, next.y, next.z);
+        }
+        error
+    }
+}

@@ -1,0 +1,179 @@
+//! The swing foot: from foothold to foothold, with contact that comes early or late.
+
+use super::ground_pose::{GroundPose, wrap};
+use mikoshi_spatial::{Foot, Pose, Twist, World};
+use nalgebra::Vector3;
+
+/// Where a foot is commanded to stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Foothold {
+    /// On the ground plane.
+    pub pose: GroundPose,
+    /// Of the sole over the plane \[m\]: not zero where the ground came early or late.
+    pub height: f64,
+}
+
+impl Foothold {
+    /// On the plane.
+    pub fn on_ground(pose: GroundPose) -> Self {
+        Self { pose, height: 0.0 }
+    }
+
+    /// As a pose in the world.
+    pub fn in_world(&self) -> Pose<World, Foot> {
+        self.pose.at_height(self.height)
+    }
+}
+
+/// How the foot swings and how it meets the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwingConfig {
+    /// Height of the arc over the ground plane \[m\].
+    pub lift_m: f64,
+    /// Vertical force from which on a foot counts as landed \[N\].
+    pub contact_force_n: f64,
+    /// Ticks in a row with that force: one noisy sample is no ground.
+    pub contact_ticks: u64,
+    /// Share of the swing before which force is no landing.
+    pub contact_from: f64,
+    /// Speed at which a foot that has found no ground is lowered further \[m/s\].
+    pub lowering_m_s: f64,
+    /// How far below the plane it is lowered at most \[m\].
+    pub lowering_max_m: f64,
+}
+
+impl Default for SwingConfig {
+    fn default() -> Self {
+        Self {
+            lift_m: 0.05,
+            contact_force_n: 30.0,
+            contact_ticks: 2,
+            contact_from: 0.7,
+            lowering_m_s: 0.05,
+            lowering_max_m: 0.02,
+        }
+    }
+}
+
+/// The quintic that leads from 0 to 1 over s in [0, 1] with no velocity and no acceleration at either
+/// end: `10 s³ − 15 s⁴ + 6 s⁵`, and its derivative by s.
+pub fn quintic(s: f64) -> (f64, f64) {
+    let s = s.clamp(0.0, 1.0);
+    (s * s * s * (10.0 + s * (-15.0 + s * 6.0)), 30.0 * s * s * (1.0 - s) * (1.0 - s))
+}
+
+/// The foot at share `s` of a swing from `from` to `to` that lasts `duration` \[s\], and its velocity.
+///
+/// x, y and yaw follow [`quintic`]; z follows it up to `lift` over the higher foothold and, in the
+/// second half, down: velocity and acceleration are zero at lift-off, apex and touchdown.
+pub fn swing_foot(
+    from: &Foothold,
+    to: &Foothold,
+    lift: f64,
+    s: f64,
+    duration: f64,
+) -> (Pose<World, Foot>, Twist<World>) {
+    let (share, rate) = quintic(s);
+    let along = to.pose.position - from.pose.position;
+    let turn = wrap(to.pose.yaw - from.pose.yaw);
+    let apex = from.height.max(to.height) + lift;
+    let (low, (rise, rise_rate)) =
+        if s < 0.5 { (from.height, quintic(2.0 * s)) } else { (to.height, quintic(2.0 - 2.0 * s)) };
+    let slope = if s < 0.5 { 2.0 } else { -2.0 };
+    let pose = GroundPose {
+        position: from.pose.position + along * share,
+        yaw: wrap(from.pose.yaw + turn * share),
+    };
+    let linear =
+        Vector3::new(along.x * rate, along.y * rate, (apex - low) * rise_rate * slope) / duration;
+    let angular = Vector3::new(0.0, 0.0, turn * rate / duration);
+    (pose.at_height(low + (apex - low) * rise), Twist::new(linear, angular))
+}
+
+/// How a swinging foot stands with the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SwingContact {
+    /// It swings. `force_ticks`: how long it has felt the ground.
+    Swinging {
+        /// Ticks in a row with force.
+        force_ticks: u64,
+    },
+    /// It found the ground before its time and stays where it is.
+    Landed {
+        /// Where.
+        at: Foothold,
+    },
+    /// Its time is over, or its ground is gone again: it is lowered slowly from here.
+    Lowering {
+        /// Where it is now.
+        at: Foothold,
+        /// Ticks in a row with force.
+        force_ticks: u64,
+    },
+}
+
+/// A foot on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swing {
+    /// Where it left.
+    pub from: Foothold,
+    /// Where it shall land.
+    pub to: Foothold,
+    /// Its contact.
+    pub contact: SwingContact,
+}
+
+impl Swing {
+    /// At lift-off.
+    pub fn new(from: Foothold, to: Foothold) -> Self {
+        Self { from, to, contact: SwingContact::Swinging { force_ticks: 0 } }
+    }
+
+    /// The contact after a tick that ends at share `s` of the swing (1 and more: its time is over), with
+    /// vertical force `force` on the foot \[N\].
+    pub fn contact_after(&self, config: &SwingConfig, force: f64, s: f64, duration: f64, dt: f64) -> SwingContact {
+        let touches = force >= config.contact_force_n;
+        let count = |force_ticks: u64| if touches { force_ticks + 1 } else { 0 };
+        match self.contact {
+            SwingContact::Swinging { force_ticks } => {
+                let force_ticks = if s >= config.contact_from { count(force_ticks) } else { 0 };
+                // Where the foot was while it felt the ground, not where this tick would take it.
+                let at = |s: f64| {
+                    let (pose, _) = swing_foot(&self.from, &self.to, config.lift_m, s, duration);
+                    Foothold { pose: GroundPose::of(&pose), height: pose.translation.z }
+                };
+                if force_ticks >= config.contact_ticks {
+                    SwingContact::Landed { at: at(s - dt / duration) }
+                } else if s > 1.0 {
+                    SwingContact::Lowering { at: self.to, force_ticks }
+                } else {
+                    SwingContact::Swinging { force_ticks }
+                }
+            }
+            SwingContact::Landed { at } if force >= 0.5 * config.contact_force_n => SwingContact::Landed { at },
+            SwingContact::Landed { at } => SwingContact::Lowering { at, force_ticks: 0 },
+            SwingContact::Lowering { at, force_ticks } => {
+                let force_ticks = count(force_ticks);
+                if force_ticks >= config.contact_ticks {
+                    return SwingContact::Landed { at };
+                }
+                let lowest = (-config.lowering_max_m).min(at.height);
+                let height = if touches { at.height } else { (at.height - config.lowering_m_s * dt).max(lowest) };
+                SwingContact::Lowering { at: Foothold { height, ..at }, force_ticks }
+            }
+        }
+    }
+
+    /// Pose and velocity at share `s` of the swing.
+    pub fn foot(&self, config: &SwingConfig, s: f64, duration: f64) -> (Pose<World, Foot>, Twist<World>) {
+        match self.contact {
+            SwingContact::Swinging { .. } => swing_foot(&self.from, &self.to, config.lift_m, s, duration),
+            SwingContact::Landed { at } => (at.in_world(), Twist::zero()),
+            SwingContact::Lowering { at, force_ticks } => {
+                let lowers = force_ticks == 0 && at.height > -config.lowering_max_m;
+                let speed = if lowers { -config.lowering_m_s } else { 0.0 };
+                (at.in_world(), Twist::new(Vector3::new(0.0, 0.0, speed), Vector3::zeros()))
+            }
+        }
+    }
+}
