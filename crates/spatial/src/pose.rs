@@ -72,6 +72,11 @@ impl<A: CoordinateFrame, B: CoordinateFrame> Pose<A, B> {
         Self::new(self.translation + displacement.linear, rotation)
     }
 
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.translation.iter().chain(&self.rotation.coords).all(|value| value.is_finite())
+    }
+
     /// `[x, y, z, qw, qx, qy, qz]`.
     pub fn to_array(&self) -> [f64; 7] {
         let (p, q) = (&self.translation, self.rotation.quaternion());

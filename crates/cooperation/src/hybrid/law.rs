@@ -1,0 +1,292 @@
+//! One tick of the hybrid law.
+
+use super::{
+    BuildHybridLawError, HandInput, HandReference, HybridError, HybridInputs, HybridOutput, HybridParameters,
+    HybridReference, HybridScratch, HybridState,
+};
+use crate::{GeneralizedForce, GeneralizedPosition, InternalForces, WorkspaceScratch};
+use core::f64::consts::PI;
+use mikoshi_spatial::{Object, Pose, Twist, World, Wrench};
+use nalgebra::{Vector3, Vector6};
+
+/// The hybrid law for one choice of internal forces and parameters. Immutable: what changes from tick to
+/// tick lives in [`HybridState`].
+#[derive(Clone, Debug)]
+pub struct HybridLaw {
+    internal_forces: InternalForces,
+    parameters: HybridParameters,
+    /// a = exp(−2π f T), the filter's pole.
+    filter_pole: f64,
+    rows: Vec<RowLaw>,
+}
+
+/// The diagonals of eqs. 35, 36 and 39 for one row.
+#[derive(Clone, Copy, Debug)]
+struct RowLaw {
+    /// k_z k_h S.
+    force_gain: Vector6<f64>,
+    /// k_z (I − S).
+    position_gain: Vector6<f64>,
+    /// I − S.
+    is_position: Vector6<f64>,
+}
+
+impl HybridLaw {
+    /// Checks the parameters and precomputes the gains.
+    pub fn new(
+        internal_forces: InternalForces,
+        parameters: HybridParameters,
+    ) -> Result<Self, BuildHybridLawError> {
+        parameters.check(&internal_forces)?;
+        let rows = parameters.selection.diagonal().zip(&parameters.gains).map(|(is_force, gains)| {
+            let (force, moment) = (gains.kh_force_m_n, gains.kh_moment_rad_nm);
+            let kh = Vector6::new(force, force, force, moment, moment, moment);
+            let is_position = Vector6::repeat(1.0) - is_force;
+            RowLaw {
+                force_gain: is_force.component_mul(&kh) * parameters.kz,
+                position_gain: is_position * parameters.kz,
+                is_position,
+            }
+        });
+        let rows = rows.collect();
+        let filter_pole = (-2.0 * PI * parameters.filter_hz * parameters.period_s).exp();
+        Ok(Self { internal_forces, parameters, filter_pole, rows })
+    }
+
+    /// The internal forces that it controls.
+    pub fn internal_forces(&self) -> &InternalForces {
+        &self.internal_forces
+    }
+
+    /// Its parameters.
+    pub fn parameters(&self) -> &HybridParameters {
+        &self.parameters
+    }
+
+    /// Number n of arms.
+    pub fn arms(&self) -> usize {
+        self.internal_forces.arms()
+    }
+
+    /// Workspaces of its size.
+    pub fn scratch(&self) -> HybridScratch {
+        HybridScratch::new(&self.internal_forces)
+    }
+
+    /// An output of its size.
+    pub fn output(&self) -> HybridOutput {
+        HybridOutput::new(self.arms())
+    }
+
+    /// One tick: h_c and z_c from the hands, then, if there is a reference, eq. 37 and eq. 39 as fig. 4 has
+    /// it, and new hand references. Without a reference the hand references hold; h_c is filtered all the
+    /// same.
+    ///
+    /// O(n) with a tree of internal forces, O(n²) with any other. No allocation, no panic. On an error
+    /// nothing is changed: the caller's last output stands.
+    pub fn act<const CAPACITY: usize>(
+        &self,
+        state: &mut HybridState<CAPACITY>,
+        scratch: &mut HybridScratch,
+        inputs: &HybridInputs,
+        out: &mut HybridOutput,
+    ) -> Result<(), HybridError> {
+        self.check(state, scratch, inputs, out)?;
+        load(state, scratch, inputs.hands)?;
+        let HybridScratch { workspace, sticks, hand_pose_ref } = scratch;
+        let HybridOutput { force: h_c, position: z_c, hands: references, hands_held_back } = out;
+
+        let hands = sticks.iter().zip(inputs.hands).map(|(stick, hand)| (*stick, hand.pose, hand.wrench));
+        workspace.evaluate(&self.internal_forces, hands, h_c, z_c);
+        self.filter(state, h_c);
+        state.ticks += 1;
+
+        *hands_held_back = 0;
+        let at_rest = Twist::zero();
+        let Some(reference) = &inputs.reference else {
+            for (out, pose) in references.iter_mut().zip(hand_pose_ref.iter()) {
+                *out = HandReference { pose: *pose, twist: at_rest };
+            }
+            store(state, references);
+            return Ok(());
+        };
+
+        self.tip_displacements(h_c, z_c, reference, workspace);
+        let object_twist = self.feed_forward(reference);
+        for ((((out, pose), hand), stick), tip) in references
+            .iter_mut()
+            .zip(hand_pose_ref.iter())
+            .zip(inputs.hands)
+            .zip(sticks.iter())
+            .zip(&workspace.tip_twists)
+        {
+            // The object and all hands move as one body.
+            let twist = object_twist.shifted(&(hand.pose.translation - z_c.external.translation));
+            let feedback = stick.hand_displacement(&hand.pose, tip);
+            // Deviation from eq. 38, which adds to measured joint angles: that turns every servo's droop,
+            // divided by kz, into a standing error. References integrate, and measurement closes the loop
+            // through z_c alone.
+            let wanted = pose.displaced(&(feedback + twist * self.parameters.period_s));
+            let (pose, is_held_back) = self.within_lead(hand, wanted);
+            *hands_held_back += usize::from(is_held_back);
+            *out = HandReference { pose, twist };
+        }
+        store(state, references);
+        Ok(())
+    }
+
+    fn check<const CAPACITY: usize>(
+        &self,
+        state: &HybridState<CAPACITY>,
+        scratch: &HybridScratch,
+        inputs: &HybridInputs,
+        out: &HybridOutput,
+    ) -> Result<(), HybridError> {
+        let n = self.arms();
+        let has_rows = |h: &GeneralizedForce, z: &GeneralizedPosition| {
+            h.internal.len() + 1 == n && z.internal.len() + 1 == n
+        };
+        let are_sizes_right = n <= CAPACITY
+            && state.arms == n as u64
+            && scratch.sticks.len() == n
+            && scratch.workspace.work_twists.len() == self.internal_forces.work_len()
+            && inputs.hands.len() == n
+            && inputs.reference.is_none_or(|reference| has_rows(reference.force, reference.position))
+            && has_rows(&out.force, &out.position)
+            && out.hands.len() == n;
+        if !are_sizes_right {
+            return Err(HybridError::WrongSize);
+        }
+        let is_hand_finite = |hand: &HandInput| {
+            hand.pose.is_finite() && hand.pose_commanded.is_finite() && hand.wrench.is_finite()
+        };
+        let is_reference_finite = |reference: &HybridReference| {
+            reference.object_twist.is_finite()
+                && reference.force.external.is_finite()
+                && reference.force.internal.iter().all(Wrench::is_finite)
+                && reference.position.external.is_finite()
+                && reference.position.internal.iter().all(Twist::is_finite)
+        };
+        let is_finite = inputs.hands.iter().all(is_hand_finite)
+            && inputs.reference.as_ref().is_none_or(is_reference_finite);
+        if is_finite { Ok(()) } else { Err(HybridError::NonFiniteInput) }
+    }
+
+    /// First-order low-pass on h, each row in its own axes; the first tick's h is where it starts.
+    fn filter<const CAPACITY: usize>(&self, state: &mut HybridState<CAPACITY>, h: &mut GeneralizedForce) {
+        let is_first = state.ticks == 0;
+        let filter = |memory: &mut [f64; 6], new: [f64; 6]| {
+            for (memory, new) in memory.iter_mut().zip(new) {
+                *memory = if is_first { new } else { new + self.filter_pole * (*memory - new) };
+            }
+        };
+        let mut rows = state.filtered_force.iter_mut();
+        if let Some(memory) = rows.next() {
+            filter(memory, h.external.to_array());
+            h.external = Wrench::from_array(memory);
+        }
+        for (row, memory) in h.internal.iter_mut().zip(rows) {
+            filter(memory, row.to_array());
+            *row = Wrench::from_array(memory);
+        }
+    }
+
+    /// The law's δz, and the tips' displacements for it, which it leaves in `workspace.tip_twists`.
+    fn tip_displacements(
+        &self,
+        h_c: &GeneralizedForce,
+        z_c: &GeneralizedPosition,
+        reference: &HybridReference,
+        workspace: &mut WorkspaceScratch,
+    ) {
+        let WorkspaceScratch { tip_twists, row_twists, work_twists, .. } = workspace;
+        let X_WA: &Pose<World, Object> = &z_c.external;
+        let mut rows = self.rows.iter().zip(row_twists.iter_mut());
+        if let Some((row, dz)) = rows.next() {
+            let force_error = reference.force.external - h_c.external;
+            // Deviation from eqs. 37 and 39, which subtract Euler angles and map them by Ba: the rotation
+            // vector from z_c to z_r is what Ba (z_r − z_c) stands for, without its singularity.
+            let position_error = X_WA.displacement_to(&reference.position.external);
+            *dz = row.displacement(&force_error, &position_error);
+        }
+        let h_errors = reference.force.internal.iter().zip(&h_c.internal);
+        let z_errors = reference.position.internal.iter().zip(&z_c.internal);
+        for ((row, dz), ((h_r, h_c), (z_r, z_c))) in rows.zip(h_errors.zip(z_errors)) {
+            *dz = row.displacement(&(*h_r - *h_c), &(*z_r - *z_c)).expressed_in(X_WA);
+        }
+        // By duality with eq. 9; the paper leaves this step to J†.
+        self.internal_forces.tip_displacements(row_twists, tip_twists, work_twists);
+    }
+
+    /// The object's reference twist on its position axes. Beyond the paper, whose law lags a moving
+    /// reference by its velocity times T / kz.
+    fn feed_forward(&self, reference: &HybridReference) -> Twist<World> {
+        let is_position = self.rows.first().map_or_else(Vector6::zeros, |row| row.is_position);
+        Twist::from_vector(&is_position.component_mul(&reference.object_twist.to_vector()))
+    }
+
+    /// Anti-windup: a reference that leads its robot by no more than the limits, and whether it had to be
+    /// held back.
+    fn within_lead(
+        &self,
+        hand: &HandInput,
+        wanted: Pose<World, mikoshi_spatial::Hand>,
+    ) -> (Pose<World, mikoshi_spatial::Hand>, bool) {
+        let lead = hand.pose_commanded.displacement_to(&wanted);
+        let (linear, is_far) = shortened(lead.linear, self.parameters.lead_limit_m);
+        let (angular, is_turned_far) = shortened(lead.angular, self.parameters.lead_limit_rad);
+        if is_far || is_turned_far {
+            (hand.pose_commanded.displaced(&Twist::new(linear, angular)), true)
+        } else {
+            (wanted, false)
+        }
+    }
+}
+
+impl RowLaw {
+    /// One row of `k_z Ba (z_r − (I − S) z_c)` with eq. 37 for z_r: `kz (kh S (h_r − h_c) + (I − S)(z_r^input − z_c))`.
+    ///
+    /// Deviation from eq. 39, which subtracts all of z_c: fig. 4 has an (I − S) there. Without it force
+    /// axes become springs and keep a standing force. The sign holds for f the wrench that a hand applies
+    /// TO the object.
+    fn displacement<F: mikoshi_spatial::CoordinateFrame>(
+        &self,
+        force_error: &Wrench<F>,
+        position_error: &Twist<F>,
+    ) -> Twist<F> {
+        Twist::from_vector(
+            &(self.force_gain.component_mul(&force_error.to_vector())
+                + self.position_gain.component_mul(&position_error.to_vector())),
+        )
+    }
+}
+
+/// Reads sticks and last references; at the first tick those are what the robots have commanded.
+fn load<const CAPACITY: usize>(
+    state: &HybridState<CAPACITY>,
+    scratch: &mut HybridScratch,
+    hands: &[HandInput],
+) -> Result<(), HybridError> {
+    for (stick, array) in scratch.sticks.iter_mut().zip(&state.sticks) {
+        stick.X_HB = Pose::from_array(array).ok_or(HybridError::InvalidState)?;
+    }
+    for ((pose, array), hand) in scratch.hand_pose_ref.iter_mut().zip(&state.hand_pose_ref).zip(hands) {
+        *pose = match state.ticks {
+            0 => hand.pose_commanded,
+            _ => Pose::from_array(array).ok_or(HybridError::InvalidState)?,
+        };
+    }
+    Ok(())
+}
+
+fn store<const CAPACITY: usize>(state: &mut HybridState<CAPACITY>, references: &[HandReference]) {
+    for (array, reference) in state.hand_pose_ref.iter_mut().zip(references) {
+        *array = reference.pose.to_array();
+    }
+}
+
+/// `v` shortened to `limit`, and whether it was longer.
+fn shortened(v: Vector3<f64>, limit: f64) -> (Vector3<f64>, bool) {
+    let norm = v.norm();
+    if norm > limit { (v * (limit / norm), true) } else { (v, false) }
+}
