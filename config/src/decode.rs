@@ -113,7 +113,6 @@ fn in_words(expected: &str) -> &str {
         "u8" => "a whole number from 0 to 255",
         "a sequence" => "an array",
         "a map" => "a table",
-        structure if structure.starts_with("struct ") => "a table",
         other => other,
     }
 }
@@ -163,6 +162,19 @@ impl<'de> Deserializer<'de> for &'de Node {
         visitor.visit_newtype_struct(self)
     }
 
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, DecodeError> {
+        match &self.value {
+            Value::Table(_) => self.deserialize_any(visitor),
+            // Serde would take an array for the fields in order.
+            other => Err(DecodeError::new(format!("found {}, expected a table", other.describe()))),
+        }
+    }
+
     fn deserialize_enum<V: Visitor<'de>>(
         self,
         _name: &'static str,
@@ -185,7 +197,7 @@ impl<'de> Deserializer<'de> for &'de Node {
 
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq
-        tuple tuple_struct map struct identifier ignored_any
+        tuple tuple_struct map identifier ignored_any
     }
 }
 

@@ -15,7 +15,8 @@ fn names_in(name: &str) -> Vec<String> {
 }
 
 fn load(name: &str, overrides: &[(&str, &str)]) -> LoadedScenario {
-    let overrides: Vec<_> = overrides.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+    let overrides: Vec<_> =
+        overrides.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
     let path = folder("scenarios").join(name).with_extension("toml");
     load_scenario(&path, &overrides, None).unwrap_or_else(|error| panic!("{error}"))
 }
