@@ -10,6 +10,8 @@
 
 #![allow(non_snake_case)]
 
+pub mod balance;
+pub mod gait;
 pub mod kinematics;
 pub mod model;
 

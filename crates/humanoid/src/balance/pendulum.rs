@@ -1,6 +1,6 @@
 //! The linear inverted pendulum, and what a load in the hands does to it.
 
-use mikoshi_spatial::{Wrench, World};
+use mikoshi_spatial::{World, Wrench};
 use nalgebra::{Vector2, Vector3};
 
 /// Standard gravity \[m/s²\].
@@ -63,8 +63,7 @@ pub struct ExternalLoad {
 
 impl ExternalLoad {
     /// Nothing but the ground touches the robot.
-    pub const NONE: Self =
-        Self { kappa: 1.0, shift: Vector2::new(0.0, 0.0), about: Vector2::new(0.0, 0.0) };
+    pub const NONE: Self = Self { kappa: 1.0, shift: Vector2::new(0.0, 0.0), about: Vector2::new(0.0, 0.0) };
 
     /// The load of hands that apply `wrench` TO the object at `point` (world), the sign of eq. 39. The
     /// ground lies at `ground_height` \[m\].

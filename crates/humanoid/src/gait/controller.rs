@@ -232,11 +232,13 @@ impl Gait {
         let feet = PerFoot::from_fn(|side| match swinging {
             Some(SwingingFoot { side: swinging, swing }) if swinging == side => {
                 let (pose, twist) = swing.foot(&self.config.swing, share, duration);
-                FootReference { pose, twist, in_contact: matches!(swing.contact, SwingContact::Landed { .. }) }
+                FootReference {
+                    pose,
+                    twist,
+                    in_contact: matches!(swing.contact, SwingContact::Landed { .. }),
+                }
             }
-            _ => {
-                FootReference { pose: state.feet[side].in_world(), twist: Twist::zero(), in_contact: true }
-            }
+            _ => FootReference { pose: state.feet[side].in_world(), twist: Twist::zero(), in_contact: true },
         });
         let PreviewState { com, com_velocity, com_acceleration, .. } = state.preview;
         GaitReference {
@@ -257,7 +259,9 @@ impl Gait {
         let timing = &self.config.timing;
         let ticks = timing.single_support as f64;
         match *clock {
-            StepClock::Stepping { step_index, tick_in_step, .. } if tick_in_step >= timing.lift_off(step_index) => {
+            StepClock::Stepping { step_index, tick_in_step, .. }
+                if tick_in_step >= timing.lift_off(step_index) =>
+            {
                 (tick_in_step + 1 - timing.lift_off(step_index)) as f64 / ticks
             }
             _ => (ticks + 1.0) / ticks,
@@ -331,7 +335,8 @@ impl Gait {
         match (state.phase, inputs.clock) {
             (GaitPhase::Standing { zmp }, _) => ZmpReference::resting(zmp),
             (GaitPhase::Finishing { zmp_from, .. }, clock) => {
-                let start = if let StepClock::Finishing { tick } = clock { -(tick as i64) } else { -i64::MAX / 4 };
+                let start =
+                    if let StepClock::Finishing { tick } = clock { -(tick as i64) } else { -i64::MAX / 4 };
                 shift_to(ZmpReference::resting(zmp_from), start, timing.double_support, self.middle(&feet))
             }
             (phase, StepClock::Stepping { step_index, tick_in_step, swing, will_continue }) => {
@@ -342,7 +347,8 @@ impl Gait {
                 let lift_off = step_start + timing.lift_off(step_index) as i64;
                 let shift_ticks = if step_index == 0 { timing.first_shift } else { timing.double_support };
                 let reference = match phase {
-                    GaitPhase::ShiftingWeight { zmp_from, .. } | GaitPhase::DoubleSupport { zmp_from, .. } => {
+                    GaitPhase::ShiftingWeight { zmp_from, .. }
+                    | GaitPhase::DoubleSupport { zmp_from, .. } => {
                         let resting = ZmpReference::resting(zmp_from);
                         shift_to(resting, lift_off - shift_ticks as i64, shift_ticks, under_stance)
                     }
@@ -369,11 +375,7 @@ impl Gait {
 }
 
 /// The worst error (eq. 40) of both feet as a multiple of `threshold`.
-fn relative_error(
-    reference: &PerFoot<GroundPose>,
-    feet: &PerFoot<GroundPose>,
-    threshold: &FootError,
-) -> f64 {
+fn relative_error(reference: &PerFoot<GroundPose>, feet: &PerFoot<GroundPose>, threshold: &FootError) -> f64 {
     let of = |side| FootError::between(&reference[side], &feet[side]).relative_to(threshold);
     of(Side::Right).max(of(Side::Left))
 }

@@ -113,7 +113,10 @@ impl GaitPhase {
             }
             (Self::Standing { .. }, _) => self,
 
-            (Self::ShiftingWeight { zmp_from, step }, StepClock::Stepping { step_index: 0, tick_in_step, .. }) => {
+            (
+                Self::ShiftingWeight { zmp_from, step },
+                StepClock::Stepping { step_index: 0, tick_in_step, .. },
+            ) => {
                 if tick_in_step < timing.lift_off(0) {
                     Self::ShiftingWeight { zmp_from, step }
                 } else {
@@ -122,7 +125,11 @@ impl GaitPhase {
             }
             (Self::ShiftingWeight { .. }, _) => Self::Finishing { zmp_from: zmp_ref, landing: None },
 
-            (Self::SingleSupport { index, .. }, StepClock::Stepping { step_index, .. }) if index == step_index => self,
+            (Self::SingleSupport { index, .. }, StepClock::Stepping { step_index, .. })
+                if index == step_index =>
+            {
+                self
+            }
             (Self::SingleSupport { foot, .. }, StepClock::Stepping { step_index, swing, .. }) => {
                 let side = swing.mirrored(mirrored);
                 let step = PlannedStep { index: step_index, side, to: feet[side].pose };
@@ -203,11 +210,15 @@ impl GaitPhase {
     pub fn is_ready(&self, clock: &StepClock) -> bool {
         match (self, clock) {
             (Self::Standing { .. }, StepClock::Standing) => true,
-            (Self::ShiftingWeight { step, .. }, StepClock::Stepping { step_index, .. }) => step.index == *step_index,
+            (Self::ShiftingWeight { step, .. }, StepClock::Stepping { step_index, .. }) => {
+                step.index == *step_index
+            }
             (Self::DoubleSupport { step, landing: None, .. }, StepClock::Stepping { step_index, .. }) => {
                 step.index == *step_index
             }
-            (Self::SingleSupport { index, .. }, StepClock::Stepping { step_index, .. }) => index == step_index,
+            (Self::SingleSupport { index, .. }, StepClock::Stepping { step_index, .. }) => {
+                index == step_index
+            }
             _ => false,
         }
     }

@@ -91,7 +91,8 @@ pub struct PreviewControl {
 impl PreviewControl {
     /// Solves for the gains.
     pub fn new(config: &PreviewConfig) -> Result<Self, SolvePreviewError> {
-        let PreviewConfig { control_period_s: dt, com_height_m, horizon_s, error_weight, jerk_weight } = *config;
+        let PreviewConfig { control_period_s: dt, com_height_m, horizon_s, error_weight, jerk_weight } =
+            *config;
         let positive = [dt, com_height_m, horizon_s, jerk_weight].iter().all(|value| *value > 0.0);
         if !(positive && error_weight > 0.0) {
             return Err(SolvePreviewError::NotPositive);
@@ -121,7 +122,8 @@ impl PreviewControl {
             x = closed_transposed * x;
         }
         // Σ_{i≥0} Ãcⁱᵀ x = (I − Ãcᵀ)⁻¹ x; Ãc is stable, so I − Ãcᵀ is regular.
-        let tail = (Matrix4::identity() - closed_transposed).lu().solve(&x).ok_or(SolvePreviewError::NoSolution)?;
+        let tail =
+            (Matrix4::identity() - closed_transposed).lu().solve(&x).ok_or(SolvePreviewError::NoSolution)?;
         if let Some(last) = gain_preview.last_mut() {
             *last += gain_of(&tail);
         }
@@ -180,7 +182,8 @@ impl PreviewControl {
             let x = Vector3::new(state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]);
             let jerk = -self.gain_error * state.error_sum[axis] - (self.gain_state * x).x - preview[axis];
             let next = self.transition * x + self.input * jerk;
-            (state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]) = (next.x, next.y, next.z);
+            (state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]) =
+                (next.x, next.y, next.z);
         }
         error
     }

@@ -80,12 +80,9 @@ pub fn swing_foot(
     let (low, (rise, rise_rate)) =
         if s < 0.5 { (from.height, quintic(2.0 * s)) } else { (to.height, quintic(2.0 - 2.0 * s)) };
     let slope = if s < 0.5 { 2.0 } else { -2.0 };
-    let pose = GroundPose {
-        position: from.pose.position + along * share,
-        yaw: wrap(from.pose.yaw + turn * share),
-    };
-    let linear =
-        Vector3::new(along.x * rate, along.y * rate, (apex - low) * rise_rate * slope) / duration;
+    let pose =
+        GroundPose { position: from.pose.position + along * share, yaw: wrap(from.pose.yaw + turn * share) };
+    let linear = Vector3::new(along.x * rate, along.y * rate, (apex - low) * rise_rate * slope) / duration;
     let angular = Vector3::new(0.0, 0.0, turn * rate / duration);
     (pose.at_height(low + (apex - low) * rise), Twist::new(linear, angular))
 }
@@ -131,7 +128,14 @@ impl Swing {
 
     /// The contact after a tick that ends at share `s` of the swing (1 and more: its time is over), with
     /// vertical force `force` on the foot \[N\].
-    pub fn contact_after(&self, config: &SwingConfig, force: f64, s: f64, duration: f64, dt: f64) -> SwingContact {
+    pub fn contact_after(
+        &self,
+        config: &SwingConfig,
+        force: f64,
+        s: f64,
+        duration: f64,
+        dt: f64,
+    ) -> SwingContact {
         let touches = force >= config.contact_force_n;
         let count = |force_ticks: u64| if touches { force_ticks + 1 } else { 0 };
         match self.contact {
@@ -150,7 +154,9 @@ impl Swing {
                     SwingContact::Swinging { force_ticks }
                 }
             }
-            SwingContact::Landed { at } if force >= 0.5 * config.contact_force_n => SwingContact::Landed { at },
+            SwingContact::Landed { at } if force >= 0.5 * config.contact_force_n => {
+                SwingContact::Landed { at }
+            }
             SwingContact::Landed { at } => SwingContact::Lowering { at, force_ticks: 0 },
             SwingContact::Lowering { at, force_ticks } => {
                 let force_ticks = count(force_ticks);
@@ -158,7 +164,8 @@ impl Swing {
                     return SwingContact::Landed { at };
                 }
                 let lowest = (-config.lowering_max_m).min(at.height);
-                let height = if touches { at.height } else { (at.height - config.lowering_m_s * dt).max(lowest) };
+                let height =
+                    if touches { at.height } else { (at.height - config.lowering_m_s * dt).max(lowest) };
                 SwingContact::Lowering { at: Foothold { height, ..at }, force_ticks }
             }
         }
