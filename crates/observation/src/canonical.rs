@@ -1,0 +1,131 @@
+//! The identity of a run: every payload of every service, in one canonical order.
+
+use mikoshi_ipc_types::{
+    Frame, JointCommand, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, TeamCommand, TeamState,
+};
+
+/// All frames of one tick.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub struct Observation {
+    pub sensors: Vec<Frame<Sensors>>,
+    pub object_truth: Frame<ObjectTruth>,
+    pub robot_truth: Vec<Frame<RobotTruth>>,
+    pub robot_state: Vec<Frame<RobotState>>,
+    pub team_command: Vec<Frame<TeamCommand>>,
+    pub team_state: Frame<TeamState>,
+    pub joint_command: Vec<Frame<JointCommand>>,
+}
+
+/// One payload of a tick, as bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct PayloadRef<'a> {
+    /// [`Payload::NAME`].
+    pub name: &'static str,
+    /// Index of the robot, or 0.
+    pub robot: usize,
+    /// The tick it belongs to.
+    pub tick: u64,
+    /// The payload itself.
+    pub bytes: &'a [u8],
+}
+
+impl Observation {
+    /// Zeroed frames for a team.
+    pub fn for_team(robots: usize) -> Self {
+        Self {
+            sensors: vec![Frame::zeroed(); robots],
+            object_truth: Frame::zeroed(),
+            robot_truth: vec![Frame::zeroed(); robots],
+            robot_state: vec![Frame::zeroed(); robots],
+            team_command: vec![Frame::zeroed(); robots],
+            team_state: Frame::zeroed(),
+            joint_command: vec![Frame::zeroed(); robots],
+        }
+    }
+
+    /// The tick that all frames belong to.
+    pub fn tick(&self) -> u64 {
+        self.object_truth.envelope.tick
+    }
+
+    /// Every payload, in the order in which a tick produces them.
+    pub fn for_each_payload(&self, mut visit: impl FnMut(PayloadRef<'_>)) {
+        fn each<P: Payload>(frames: &[Frame<P>], visit: &mut impl FnMut(PayloadRef<'_>)) {
+            for (robot, frame) in frames.iter().enumerate() {
+                let bytes = bytemuck::bytes_of(&frame.payload);
+                visit(PayloadRef { name: P::NAME, robot, tick: frame.envelope.tick, bytes });
+            }
+        }
+        each(&self.sensors, &mut visit);
+        each(core::slice::from_ref(&self.object_truth), &mut visit);
+        each(&self.robot_truth, &mut visit);
+        each(&self.robot_state, &mut visit);
+        each(&self.team_command, &mut visit);
+        each(core::slice::from_ref(&self.team_state), &mut visit);
+        each(&self.joint_command, &mut visit);
+    }
+}
+
+/// One hash over the payload of every frame of every service, in canonical order.
+#[derive(Clone, Debug, Default)]
+pub struct LogHash {
+    hasher: blake3::Hasher,
+}
+
+impl LogHash {
+    /// Takes in all frames of a tick.
+    pub fn observe(&mut self, observation: &Observation) {
+        observation.for_each_payload(|payload| {
+            self.hasher.update(payload.name.as_bytes());
+            self.hasher.update(&(payload.robot as u64).to_le_bytes());
+            self.hasher.update(&payload.tick.to_le_bytes());
+            self.hasher.update(payload.bytes);
+        });
+    }
+
+    /// The hash so far, in hexadecimal.
+    pub fn to_hex(&self) -> String {
+        self.hasher.finalize().to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hash_of(observation: &Observation) -> String {
+        let mut hash = LogHash::default();
+        hash.observe(observation);
+        hash.to_hex()
+    }
+
+    #[test]
+    fn flipping_one_bit_of_any_payload_changes_the_hash() {
+        let undisturbed = hash_of(&Observation::for_team(2));
+        let mut flips = 0;
+        let mut check = |disturb: &dyn Fn(&mut Observation)| {
+            let mut observation = Observation::for_team(2);
+            disturb(&mut observation);
+            assert_ne!(hash_of(&observation), undisturbed);
+            flips += 1;
+        };
+        check(&|o| bytemuck::bytes_of_mut(&mut o.sensors[1].payload)[17] ^= 1);
+        check(&|o| bytemuck::bytes_of_mut(&mut o.object_truth.payload)[0] ^= 1);
+        check(&|o| bytemuck::bytes_of_mut(&mut o.robot_truth[0].payload)[99] ^= 128);
+        check(&|o| bytemuck::bytes_of_mut(&mut o.robot_state[1].payload)[8] ^= 2);
+        check(&|o| bytemuck::bytes_of_mut(&mut o.team_command[0].payload)[3] ^= 4);
+        check(&|o| bytemuck::bytes_of_mut(&mut o.team_state.payload)[1000] ^= 8);
+        check(&|o| bytemuck::bytes_of_mut(&mut o.joint_command[1].payload)[512] ^= 16);
+        assert_eq!(flips, 7);
+    }
+
+    #[test]
+    fn epoch_and_stamp_lie_outside_the_identity() {
+        let undisturbed = hash_of(&Observation::for_team(1));
+        let mut observation = Observation::for_team(1);
+        observation.sensors[0].envelope.epoch = 7;
+        observation.sensors[0].envelope.stamp_ns = 123;
+        assert_eq!(hash_of(&observation), undisturbed);
+    }
+}

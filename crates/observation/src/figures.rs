@@ -1,0 +1,328 @@
+//! The figures of a run, gathered tick by tick from ground truth.
+
+use crate::canonical::Observation;
+use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
+use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotTruth, mode};
+use mikoshi_spatial::{Hand, Object, Pose, World, Wrench};
+use nalgebra::Vector2;
+use std::collections::BTreeMap;
+
+/// How long after its start the hybrid law is judged.
+const JUDGED_AFTER_S: f64 = 3.0;
+/// Length of the windows whose largest value counts.
+const WINDOW_S: f64 = 0.2;
+/// Length of the window in which measured and true internal forces are compared.
+const COMPARED_S: f64 = 1.0;
+/// A sole is set down while it bears more than this share of the robot's weight.
+const LOADED_SHARE: f64 = 0.05;
+const GRAVITY_M_S2: f64 = 9.81;
+
+/// What must be known of a robot to judge it.
+#[derive(Clone, Debug)]
+pub struct ObservedRobot {
+    /// Its name.
+    pub name: String,
+    /// Its mass.
+    pub mass_kg: f64,
+    /// Hands that grasp.
+    pub hands: usize,
+    /// Name, position limits and torque limit of each joint.
+    pub joints: Vec<ObservedJoint>,
+}
+
+/// A joint's limits.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub struct ObservedJoint {
+    pub name: String,
+    pub lower_rad: f64,
+    pub upper_rad: f64,
+    pub torque_limit_nm: f64,
+}
+
+/// What must be known of a run to judge it.
+#[derive(Clone, Debug)]
+pub struct ObservedRun {
+    /// Period of a tick.
+    pub control_period_s: f64,
+    /// Number of ticks.
+    pub ticks: u64,
+    /// When the hybrid law starts, if it does.
+    pub hybrid_start_tick: Option<u64>,
+    /// The robots.
+    pub robots: Vec<ObservedRobot>,
+    /// Name and coefficients of each internal force (a row of C).
+    pub internal_rows: Vec<(String, Vec<f64>)>,
+}
+
+/// Gathers a run's figures.
+#[derive(Clone, Debug)]
+pub struct Figures {
+    run: ObservedRun,
+    internal: Vec<InternalSummary>,
+    end_samples: u64,
+    measurement_error: (f64, f64),
+    object: ObjectFigures,
+    robots: Vec<RobotFigures>,
+    unintended_contact_ticks: u64,
+}
+
+/// What [`Figures`] come to.
+#[derive(Clone, Debug)]
+#[allow(missing_docs)]
+pub struct JudgedFigures {
+    pub object: ObjectSummary,
+    pub internal: Vec<InternalSummary>,
+    pub internal_measurement_error_n: f64,
+    pub internal_measurement_error_nm: f64,
+    pub robots: Vec<RobotSummary>,
+    pub fell: Vec<String>,
+    pub unintended_contact_ticks: u64,
+}
+
+impl Figures {
+    /// Nothing observed yet.
+    pub fn new(run: ObservedRun) -> Self {
+        let internal = run
+            .internal_rows
+            .iter()
+            .map(|(name, _)| InternalSummary { name: name.clone(), ..InternalSummary::default() })
+            .collect();
+        let robots = run.robots.iter().map(RobotFigures::new).collect();
+        Self {
+            run,
+            internal,
+            end_samples: 0,
+            measurement_error: (0.0, 0.0),
+            object: ObjectFigures::default(),
+            robots,
+            unintended_contact_ticks: 0,
+        }
+    }
+
+    /// Takes in one tick. Ticks come in order.
+    pub fn observe(&mut self, observation: &Observation) {
+        let tick = observation.tick();
+        let Some(X_WA) = Pose::<World, Object>::from_array(&observation.object_truth.payload.pose) else {
+            return;
+        };
+        self.observe_internal_forces(tick, &X_WA, observation);
+        let is_judged = self.run.hybrid_start_tick.is_none_or(|start| tick >= start);
+        self.object.observe(&X_WA, &observation.team_state.payload.object_pose_ref, is_judged);
+        for (figures, truth) in self.robots.iter_mut().zip(&observation.robot_truth) {
+            figures.observe(&truth.payload);
+        }
+        if observation.object_truth.payload.unintended_contacts > 0 {
+            self.unintended_contact_ticks += 1;
+        }
+    }
+
+    /// Generalized internal forces from the true wrenches: eqs. A1, 11 and 28.
+    fn observe_internal_forces(&mut self, tick: u64, X_WA: &Pose<World, Object>, observation: &Observation) {
+        let tips: Vec<Wrench<World>> = self
+            .run
+            .robots
+            .iter()
+            .zip(&observation.robot_truth)
+            .flat_map(|(robot, truth)| {
+                (0..robot.hands).map(move |hand| tip_wrench(&truth.payload, hand, X_WA))
+            })
+            .collect();
+        let seconds = |s: f64| (s / self.run.control_period_s).round() as u64;
+        let start = self.run.hybrid_start_tick.unwrap_or(0);
+        let judged = start + seconds(JUDGED_AFTER_S)..=start + seconds(JUDGED_AFTER_S + WINDOW_S);
+        let is_end = tick + seconds(WINDOW_S) >= self.run.ticks;
+        let is_compared = tick + seconds(COMPARED_S) >= self.run.ticks
+            && observation.team_state.payload.team_mode == mode::HYBRID;
+        if is_end {
+            self.end_samples += 1;
+        }
+        for (row, (summary, (_, coefficients))) in
+            self.internal.iter_mut().zip(&self.run.internal_rows).enumerate()
+        {
+            let force_W = tips.iter().zip(coefficients).fold(Wrench::zero(), |sum, (tip, c)| sum + *tip * *c);
+            let force_A: Wrench<Object> = force_W.expressed_in(&X_WA.inverse());
+            let (force_n, moment_nm) = (force_A.force.norm(), force_A.moment.norm());
+            let raise = |largest: &mut f64, value: f64| *largest = largest.max(value);
+            if tick >= start {
+                raise(&mut summary.peak_n, force_n);
+                raise(&mut summary.peak_nm, moment_nm);
+            }
+            if tick == start {
+                (summary.start_n, summary.start_nm) = (force_n, moment_nm);
+            }
+            if judged.contains(&tick) {
+                raise(&mut summary.after_3s_n, force_n);
+                raise(&mut summary.after_3s_nm, moment_nm);
+            }
+            if is_end {
+                raise(&mut summary.end_n, force_n);
+                raise(&mut summary.end_nm, moment_nm);
+                for (mean, value) in summary.end_mean.iter_mut().zip(force_A.to_array()) {
+                    *mean += value;
+                }
+            }
+            if is_compared {
+                let measured = observation.team_state.payload.generalized_force[row + 1];
+                let error = Wrench::<Object>::from_array(&measured) - force_A;
+                raise(&mut self.measurement_error.0, error.force.norm());
+                raise(&mut self.measurement_error.1, error.moment.norm());
+            }
+        }
+    }
+
+    /// The figures of all ticks observed.
+    pub fn finish(mut self) -> JudgedFigures {
+        for summary in &mut self.internal {
+            summary.end_mean = summary.end_mean.map(|sum| sum / self.end_samples.max(1) as f64);
+        }
+        let robots = self.run.robots.iter().zip(&self.robots);
+        JudgedFigures {
+            object: self.object.finish(),
+            internal: self.internal,
+            internal_measurement_error_n: self.measurement_error.0,
+            internal_measurement_error_nm: self.measurement_error.1,
+            fell: robots.clone().filter(|(_, f)| f.has_fallen).map(|(robot, _)| robot.name.clone()).collect(),
+            robots: robots.map(|(robot, figures)| figures.finish(robot)).collect(),
+            unintended_contact_ticks: self.unintended_contact_ticks,
+        }
+    }
+}
+
+/// The true wrench of a hand at the tip of its virtual stick, which is the object's origin (eq. A1).
+fn tip_wrench(truth: &RobotTruth, hand: usize, X_WA: &Pose<World, Object>) -> Wrench<World> {
+    let wrench = Wrench::from_array(&truth.hand_wrench[hand]);
+    match Pose::<World, Hand>::from_array(&truth.hand_pose[hand]) {
+        Some(X_WH) => wrench.shifted(&(X_WH.translation - X_WA.translation)),
+        None => wrench,
+    }
+}
+
+#[derive(Clone, Debug, Default)]
+struct ObjectFigures {
+    start: Option<Pose<World, Object>>,
+    last: Option<Pose<World, Object>>,
+    samples: u64,
+    squares: [f64; 6],
+    peaks: [f64; 6],
+}
+
+impl ObjectFigures {
+    fn observe(&mut self, X_WA: &Pose<World, Object>, reference: &[f64; 7], is_judged: bool) {
+        self.start.get_or_insert(*X_WA);
+        self.last = Some(*X_WA);
+        let Some(X_WA_ref) = Pose::<World, Object>::from_array(reference).filter(|_| is_judged) else {
+            return;
+        };
+        self.samples += 1;
+        let error = X_WA_ref.displacement_to(X_WA).to_array();
+        for axis in 0..6 {
+            self.squares[axis] += error[axis] * error[axis];
+            self.peaks[axis] = self.peaks[axis].max(error[axis].abs());
+        }
+    }
+
+    fn finish(&self) -> ObjectSummary {
+        let rms = self.squares.map(|sum| (sum / self.samples.max(1) as f64).sqrt());
+        let travel = match (&self.start, &self.last) {
+            (Some(start), Some(last)) => start.displacement_to(last).to_array(),
+            _ => [0.0; 6],
+        };
+        let split = |v: [f64; 6]| ([v[0], v[1], v[2]], [v[3], v[4], v[5]]);
+        let ((position_rms_m, attitude_rms_rad), (position_peak_m, attitude_peak_rad)) =
+            (split(rms), split(self.peaks));
+        let (travel_m, travel_rad) = split(travel);
+        ObjectSummary {
+            position_rms_m,
+            position_peak_m,
+            attitude_rms_rad,
+            attitude_peak_rad,
+            travel_m,
+            travel_rad,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct RobotFigures {
+    weight_n: f64,
+    limits_rad: Vec<(f64, f64)>,
+    touchdown: [Option<Vector2<f64>>; MAX_FEET],
+    zmp_margin_min_m: f64,
+    foot_slip_max_m: f64,
+    tilt_max_rad: f64,
+    steps: u64,
+    saturated_ticks: u64,
+    torque_peak_nm: [f64; MAX_JOINTS],
+    joint_margin_min_rad: (f64, usize),
+    has_fallen: bool,
+}
+
+impl RobotFigures {
+    fn new(robot: &ObservedRobot) -> Self {
+        Self {
+            weight_n: robot.mass_kg * GRAVITY_M_S2,
+            limits_rad: robot.joints.iter().map(|joint| (joint.lower_rad, joint.upper_rad)).collect(),
+            touchdown: [None; MAX_FEET],
+            zmp_margin_min_m: f64::INFINITY,
+            foot_slip_max_m: 0.0,
+            tilt_max_rad: 0.0,
+            steps: 0,
+            saturated_ticks: 0,
+            torque_peak_nm: [0.0; MAX_JOINTS],
+            joint_margin_min_rad: (f64::INFINITY, 0),
+            has_fallen: false,
+        }
+    }
+
+    fn observe(&mut self, truth: &RobotTruth) {
+        self.zmp_margin_min_m = self.zmp_margin_min_m.min(truth.zmp_margin_m);
+        self.tilt_max_rad = self.tilt_max_rad.max(truth.tilt_rad);
+        self.has_fallen |= truth.fallen != 0;
+        self.saturated_ticks += u64::from(truth.saturated_joints != 0);
+        for (peak, torque) in self.torque_peak_nm.iter_mut().zip(truth.joint_torque_peak_nm) {
+            *peak = peak.max(torque);
+        }
+        for (joint, (lower, upper)) in self.limits_rad.iter().enumerate() {
+            let q = truth.joint_position_rad[joint];
+            let margin = (q - lower).min(upper - q);
+            if margin < self.joint_margin_min_rad.0 {
+                self.joint_margin_min_rad = (margin, joint);
+            }
+        }
+        for foot in 0..MAX_FEET {
+            let position = Vector2::new(truth.sole_pose[foot][0], truth.sole_pose[foot][1]);
+            let is_loaded = truth.ground_wrench[foot][2] > LOADED_SHARE * self.weight_n;
+            match self.touchdown[foot] {
+                Some(touchdown) if is_loaded => {
+                    self.foot_slip_max_m = self.foot_slip_max_m.max((position - touchdown).norm());
+                }
+                Some(_) => {
+                    self.touchdown[foot] = None;
+                    self.steps += 1;
+                }
+                None if is_loaded => self.touchdown[foot] = Some(position),
+                None => {}
+            }
+        }
+    }
+
+    fn finish(&self, robot: &ObservedRobot) -> RobotSummary {
+        let by_name = |value: &dyn Fn(usize, &ObservedJoint) -> f64| -> BTreeMap<String, f64> {
+            robot.joints.iter().enumerate().map(|(i, joint)| (joint.name.clone(), value(i, joint))).collect()
+        };
+        let (joint_margin_min_rad, nearest) = self.joint_margin_min_rad;
+        RobotSummary {
+            name: robot.name.clone(),
+            zmp_margin_min_m: self.zmp_margin_min_m,
+            foot_slip_max_m: self.foot_slip_max_m,
+            tilt_max_rad: self.tilt_max_rad,
+            steps: self.steps,
+            joint_margin_min_rad,
+            joint_margin_joint: robot.joints.get(nearest).map(|j| j.name.clone()).unwrap_or_default(),
+            saturated_ticks: self.saturated_ticks,
+            torque_peak_nm: by_name(&|i, _| self.torque_peak_nm[i]),
+            torque_limit_nm: by_name(&|_, joint| joint.torque_limit_nm),
+        }
+    }
+}

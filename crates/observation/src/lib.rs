@@ -1,0 +1,17 @@
+//! What a run looked like: its frames in canonical order, their hash, its figures, its summary.
+//!
+//! Observers only: nothing here is ever read by a service. Figures are computed from ground truth.
+
+#![allow(non_snake_case)]
+
+mod canonical;
+mod figures;
+mod log;
+mod summary;
+mod tap;
+
+pub use canonical::{LogHash, Observation, PayloadRef};
+pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
+pub use log::{LogWriter, WriteLogError};
+pub use summary::{Fault, InternalSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
+pub use tap::TeamTap;

@@ -1,0 +1,121 @@
+//! `summary.json`: what others script against. Keys stay; more may follow. SI units.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A run's result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Summary {
+    pub scenario: String,
+    pub seed: u64,
+    pub ticks: u64,
+    pub control_period_s: f64,
+    pub sim_time_s: f64,
+    pub wall_time_s: f64,
+    pub real_time_factor: f64,
+    pub passed: bool,
+    /// Every threshold that was not met, in words.
+    pub failures: Vec<String>,
+    /// One hash over the payload of every frame of every service, in tick order.
+    pub log_hash: String,
+    /// Names of the robots that fell.
+    pub fell: Vec<String>,
+    pub object: ObjectSummary,
+    pub internal: Vec<InternalSummary>,
+    /// Largest difference between the internal forces that control saw and the true ones over the last
+    /// second.
+    pub internal_measurement_error_n: f64,
+    pub internal_measurement_error_nm: f64,
+    pub robots: Vec<RobotSummary>,
+    /// Ticks in which something touched that nobody meant to.
+    pub unintended_contact_ticks: u64,
+    pub timing: Timing,
+    pub faults: Vec<Fault>,
+    pub swaps: Vec<Swap>,
+}
+
+/// How well the object kept to its reference, from the start of the hybrid law on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct ObjectSummary {
+    pub position_rms_m: [f64; 3],
+    pub position_peak_m: [f64; 3],
+    pub attitude_rms_rad: [f64; 3],
+    pub attitude_peak_rad: [f64; 3],
+    /// True displacement over the whole run.
+    pub travel_m: [f64; 3],
+    /// True rotation over the whole run.
+    pub travel_rad: [f64; 3],
+}
+
+/// One internal force: norms of its force and of its moment, true and unfiltered.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct InternalSummary {
+    pub name: String,
+    /// Largest from the start of the hybrid law on.
+    pub peak_n: f64,
+    pub peak_nm: f64,
+    /// When the hybrid law starts, or at tick 0 where it never does.
+    pub start_n: f64,
+    pub start_nm: f64,
+    /// Largest from 3.0 to 3.2 s after the start.
+    pub after_3s_n: f64,
+    pub after_3s_nm: f64,
+    /// Largest of the last 0.2 s.
+    pub end_n: f64,
+    pub end_nm: f64,
+    /// Mean wrench of the last 0.2 s in the object's axes.
+    pub end_mean: [f64; 6],
+}
+
+/// One robot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct RobotSummary {
+    pub name: String,
+    pub zmp_margin_min_m: f64,
+    /// Largest horizontal displacement of a loaded sole since it was set down.
+    pub foot_slip_max_m: f64,
+    pub tilt_max_rad: f64,
+    pub steps: u64,
+    pub joint_margin_min_rad: f64,
+    /// The joint that came nearest to its limit.
+    pub joint_margin_joint: String,
+    pub saturated_ticks: u64,
+    /// Largest torque that each drive asked for, before its limit.
+    pub torque_peak_nm: BTreeMap<String, f64>,
+    pub torque_limit_nm: BTreeMap<String, f64>,
+}
+
+/// How long ticks took; zero where no clock is read.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Timing {
+    pub tick_p50_s: f64,
+    pub tick_p99_s: f64,
+    pub ticks_late: u64,
+    pub ticks_held: u64,
+}
+
+/// Something went wrong, and where.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Fault {
+    pub tick: u64,
+    pub service: String,
+    pub robot: Option<String>,
+    pub code: String,
+}
+
+/// A process was replaced.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Swap {
+    pub tick: u64,
+    pub service: String,
+    pub robot: Option<String>,
+    pub cause: String,
+    pub ticks_lost: u64,
+}

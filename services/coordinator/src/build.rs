@@ -1,0 +1,101 @@
+//! From a run's description to the law that controls it.
+
+use mikoshi_config::RunSpec;
+use mikoshi_config::scenario::{Axis, Control, InternalForces as Representation, Scenario};
+use mikoshi_cooperation as cooperation;
+use mikoshi_cooperation::{
+    BuildHybridLawError, BuildInternalForcesError, BuildTeamArmsError, HybridLaw, HybridParameters,
+    InternalForces, RobotArms, RowGains, Selection, StartHybridError, TeamArms,
+};
+
+/// How far a hand's reference may lead what its robot makes of it.
+const LEAD_LIMIT_M: f64 = 0.02;
+const LEAD_LIMIT_RAD: f64 = 0.05;
+
+/// Why a run has no coordinator.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum BuildCoordinatorError {
+    #[error("team: {0}")]
+    Team(#[from] BuildTeamArmsError),
+    #[error("hybrid.internal_forces: {0}")]
+    InternalForces(#[from] BuildInternalForcesError),
+    #[error("hybrid: {0}")]
+    Law(#[from] BuildHybridLawError),
+    #[error("grasp: {0}")]
+    Grasp(#[from] StartHybridError),
+    #[error("hybrid.axes: there is no row `{found}`; expected one of {expected}")]
+    UnknownRow { found: String, expected: String },
+    #[error("robot {robot}, hand {hand}: its pose in the object is not a pose")]
+    HandPose { robot: String, hand: usize },
+    #[error("{0}")]
+    Connect(#[from] mikoshi_runtime::ConnectError),
+}
+
+/// The grasping arms of the team, in hand order.
+pub fn team_arms(run: &RunSpec) -> Result<TeamArms, BuildTeamArmsError> {
+    let arms_of = |robot: &mikoshi_config::RobotSpec| RobotArms {
+        robot: robot.member.name.clone(),
+        hands: robot.grasping_hands.iter().map(|&hand| robot.config.hands[hand].name.clone()).collect(),
+    };
+    TeamArms::new(run.robots.iter().map(arms_of).collect())
+}
+
+/// The internal forces that the scenario chose.
+pub fn build_internal_forces(run: &RunSpec) -> Result<InternalForces, BuildCoordinatorError> {
+    let team = team_arms(run)?;
+    Ok(match &run.scenario.hybrid.internal_forces {
+        Representation::BalancedTree => InternalForces::balanced_tree(&team),
+        Representation::Chain => InternalForces::chain(&team),
+        Representation::Matrix(rows) => InternalForces::from_matrix(rows, team.arms())?,
+    })
+}
+
+/// The hybrid law with the scenario's gains and selection.
+pub fn build_hybrid_law(run: &RunSpec) -> Result<HybridLaw, BuildCoordinatorError> {
+    let internal_forces = build_internal_forces(run)?;
+    let hybrid = &run.scenario.hybrid;
+    let parameters = HybridParameters {
+        period_s: run.scenario.control_period_s,
+        kz: hybrid.kz,
+        gains: RowGains::scaled(&internal_forces, hybrid.kh_m_n, hybrid.kh_rad_nm),
+        selection: build_selection(&run.scenario, &internal_forces)?,
+        filter_hz: hybrid.filter_hz,
+        lead_limit_m: LEAD_LIMIT_M,
+        lead_limit_rad: LEAD_LIMIT_RAD,
+    };
+    Ok(HybridLaw::new(internal_forces, parameters)?)
+}
+
+fn build_selection(
+    scenario: &Scenario,
+    internal_forces: &InternalForces,
+) -> Result<Selection, BuildCoordinatorError> {
+    let mut selection = Selection::object_position_internal_force(internal_forces.arms());
+    for exception in &scenario.hybrid.axes {
+        let row = find_row(internal_forces, &exception.row)?;
+        let control = match exception.control {
+            Control::Position => cooperation::Control::Position,
+            Control::Force => cooperation::Control::Force,
+        };
+        let axis = match exception.axis {
+            Axis::X => cooperation::Axis::X,
+            Axis::Y => cooperation::Axis::Y,
+            Axis::Z => cooperation::Axis::Z,
+            Axis::Roll => cooperation::Axis::Roll,
+            Axis::Pitch => cooperation::Axis::Pitch,
+            Axis::Yaw => cooperation::Axis::Yaw,
+        };
+        let selected = selection.select(row, axis, control);
+        debug_assert!(selected.is_some(), "the row was just found");
+    }
+    Ok(selection)
+}
+
+/// The row of this name, or what rows there are.
+pub(crate) fn find_row(internal_forces: &InternalForces, name: &str) -> Result<usize, BuildCoordinatorError> {
+    internal_forces.row(name).ok_or_else(|| BuildCoordinatorError::UnknownRow {
+        found: name.to_owned(),
+        expected: internal_forces.names().join(", "),
+    })
+}

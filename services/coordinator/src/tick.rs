@@ -1,0 +1,243 @@
+//! One tick of the team's controller. No allocation, no clock, no I/O, no panic path.
+
+use crate::build::{BuildCoordinatorError, build_hybrid_law};
+use crate::reference::References;
+use bytemuck::{Pod, Zeroable};
+use mikoshi_config::RunSpec;
+use mikoshi_cooperation::{
+    GeneralizedForce, GeneralizedPosition, HandInput, HybridInputs, HybridLaw, HybridOutput, HybridReference,
+    HybridScratch, HybridState, VirtualStick,
+};
+use mikoshi_ipc_types::{MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, mode};
+use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench};
+
+/// The team's controller. Immutable.
+#[derive(Clone, Debug)]
+pub struct Coordinator {
+    law: HybridLaw,
+    references: References,
+    /// Tick at which the hybrid law starts; it never does when absent.
+    hybrid_start_tick: Option<u64>,
+    hands_of_robots: Vec<usize>,
+    sticks: Vec<VirtualStick>,
+}
+
+/// All that matters between ticks.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoordinatorState {
+    hybrid: HybridState<MAX_HANDS_OF_TEAM>,
+    /// Object pose by the virtual sticks when the hybrid law started.
+    object_pose_at_start: [f64; 7],
+    /// One of [`mode`].
+    team_mode: u64,
+}
+
+// SAFETY: zeros are a valid value of integers and floats.
+unsafe impl Zeroable for CoordinatorState {}
+// SAFETY: `repr(C)` over Pod fields of 8-byte units and alignment only: no padding, any bit pattern valid.
+unsafe impl Pod for CoordinatorState {}
+
+/// Workspaces: filled with NaN between ticks they change nothing.
+#[derive(Clone, Debug)]
+pub struct CoordinatorScratch {
+    law: HybridScratch,
+    law_output: HybridOutput,
+    hands: Vec<HandInput>,
+    force_ref: GeneralizedForce,
+    position_ref: GeneralizedPosition,
+}
+
+/// What a tick says: a command for each robot, and the team's view for observers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoordinatorOutputs {
+    /// By robot.
+    pub commands: [TeamCommand; MAX_ROBOTS],
+    /// For observers.
+    pub team_state: TeamState,
+}
+
+/// Why a tick could not be computed. The state is as it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum CoordinateError {
+    #[error("a hand's pose is not a pose")]
+    HandPose,
+    #[error("the hybrid law rejects its inputs")]
+    Law,
+}
+
+impl Coordinator {
+    /// For this run.
+    ///
+    /// # Errors
+    /// The scenario's hybrid law or its grasp can't be built; the error says which key.
+    pub fn new(run: &RunSpec) -> Result<Self, BuildCoordinatorError> {
+        let law = build_hybrid_law(run)?;
+        let references = References::new(&run.scenario, law.internal_forces())?;
+        let mut sticks = Vec::with_capacity(law.arms());
+        for robot in &run.robots {
+            for (hand, X_AH) in robot.hand_in_object.iter().enumerate() {
+                let X_AH = Pose::<Object, Hand>::from_array(X_AH).ok_or_else(|| {
+                    BuildCoordinatorError::HandPose { robot: robot.member.name.clone(), hand }
+                })?;
+                sticks.push(VirtualStick::from_hand_in_object(&X_AH));
+            }
+        }
+        let period_s = run.scenario.control_period_s;
+        Ok(Self {
+            law,
+            references,
+            hybrid_start_tick: run.scenario.hybrid.start_s.map(|start_s| (start_s / period_s).round() as u64),
+            hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
+            sticks,
+        })
+    }
+
+    /// The state at the grasp.
+    ///
+    /// # Errors
+    /// More hands grasp than a team may have.
+    pub fn initial_state(&self) -> Result<CoordinatorState, BuildCoordinatorError> {
+        Ok(CoordinatorState {
+            hybrid: HybridState::at_grasp(&self.sticks)?,
+            object_pose_at_start: Pose::<World, Object>::identity().to_array(),
+            team_mode: mode::HOLD,
+        })
+    }
+
+    /// Workspaces of its size.
+    pub fn scratch(&self) -> CoordinatorScratch {
+        let arms = self.law.arms();
+        CoordinatorScratch {
+            law: self.law.scratch(),
+            law_output: self.law.output(),
+            hands: Vec::with_capacity(arms),
+            force_ref: GeneralizedForce::zero(arms),
+            position_ref: GeneralizedPosition::at_grasp(Pose::identity(), arms),
+        }
+    }
+
+    /// One tick: h_c and z_c from the robots' hands, the hybrid law if it has started, a command for each
+    /// robot. On an error, state and outputs are as they were.
+    pub fn tick<'a>(
+        &self,
+        tick: u64,
+        state: &mut CoordinatorState,
+        scratch: &mut CoordinatorScratch,
+        robots: impl Iterator<Item = &'a RobotState>,
+        out: &mut CoordinatorOutputs,
+    ) -> Result<(), CoordinateError> {
+        let CoordinatorScratch { law: law_scratch, law_output, hands, force_ref, position_ref } = scratch;
+        read_hands(robots, &self.hands_of_robots, hands)?;
+
+        let is_hybrid = state.team_mode == mode::HYBRID;
+        let X_WA_start = Pose::from_array(&state.object_pose_at_start).ok_or(CoordinateError::Law)?;
+        let ticks_since_start = tick.saturating_sub(self.hybrid_start_tick.unwrap_or(tick));
+        self.references.fill(ticks_since_start, &X_WA_start, force_ref, position_ref);
+        let reference = is_hybrid.then_some(HybridReference {
+            force: force_ref,
+            position: position_ref,
+            object_twist: Twist::zero(),
+        });
+        let inputs = HybridInputs { hands, reference };
+        self.law
+            .act(&mut state.hybrid, law_scratch, &inputs, law_output)
+            .map_err(|_| CoordinateError::Law)?;
+
+        self.write_commands(tick, state.team_mode, law_output, out);
+        write_team_state(
+            state.team_mode,
+            law_output,
+            is_hybrid.then_some((&*force_ref, &*position_ref)),
+            out,
+        );
+        if state.team_mode == mode::HOLD && self.hybrid_start_tick.is_some_and(|start| tick + 1 >= start) {
+            // Control starts where the object is, not where it should be: nothing jumps.
+            state.object_pose_at_start = law_output.position.external.to_array();
+            state.team_mode = mode::HYBRID;
+        }
+        Ok(())
+    }
+
+    fn write_commands(&self, tick: u64, team_mode: u64, law: &HybridOutput, out: &mut CoordinatorOutputs) {
+        let mut references = law.hands.iter();
+        for (command, &hands) in out.commands.iter_mut().zip(&self.hands_of_robots) {
+            *command = TeamCommand { team_mode, state_tick: tick, ..TeamCommand::zeroed() };
+            for (hand, reference) in references.by_ref().take(hands.min(MAX_HANDS)).enumerate() {
+                command.hand_pose_ref[hand] = reference.pose.to_array();
+                command.hand_twist_ref[hand] = reference.twist.to_array();
+            }
+        }
+    }
+}
+
+impl CoordinatorScratch {
+    /// Overwrites every number with NaN.
+    pub fn poison(&mut self) {
+        let nan = f64::NAN;
+        self.law.poison();
+        self.hands.clear();
+        self.force_ref.external = Wrench::from_array(&[nan; 6]);
+        self.force_ref.internal.fill(Wrench::from_array(&[nan; 6]));
+        self.position_ref.internal.fill(Twist::from_array(&[nan; 6]));
+        for reference in &mut self.law_output.hands {
+            reference.twist = Twist::from_array(&[nan; 6]);
+            reference.pose.translation.fill(nan);
+        }
+        self.law_output.force.internal.fill(Wrench::from_array(&[nan; 6]));
+        self.law_output.position.internal.fill(Twist::from_array(&[nan; 6]));
+    }
+}
+
+impl Default for CoordinatorOutputs {
+    fn default() -> Self {
+        Self { commands: [TeamCommand::zeroed(); MAX_ROBOTS], team_state: TeamState::zeroed() }
+    }
+}
+
+fn read_hands<'a>(
+    robots: impl Iterator<Item = &'a RobotState>,
+    hands_of_robots: &[usize],
+    hands: &mut Vec<HandInput>,
+) -> Result<(), CoordinateError> {
+    hands.clear();
+    for (robot, &count) in robots.zip(hands_of_robots) {
+        let poses = robot.hand_pose.iter().zip(&robot.hand_pose_commanded);
+        for ((pose, commanded), wrench) in poses.zip(&robot.hand_wrench).take(count) {
+            let pose = Pose::<World, Hand>::from_array(pose).ok_or(CoordinateError::HandPose)?;
+            let pose_commanded = Pose::from_array(commanded).ok_or(CoordinateError::HandPose)?;
+            hands.push(HandInput { pose, pose_commanded, wrench: Wrench::from_array(wrench) });
+        }
+    }
+    Ok(())
+}
+
+fn write_team_state(
+    team_mode: u64,
+    law: &HybridOutput,
+    reference: Option<(&GeneralizedForce, &GeneralizedPosition)>,
+    out: &mut CoordinatorOutputs,
+) {
+    let measured = &law.position.external;
+    let object_pose_ref = reference.map_or(*measured, |(_, position)| position.external);
+    let team_state = &mut out.team_state;
+    *team_state = TeamState {
+        object_pose: measured.to_array(),
+        object_pose_ref: object_pose_ref.to_array(),
+        team_mode,
+        ..TeamState::zeroed()
+    };
+    write_force(&law.force, &mut team_state.generalized_force);
+    if let Some((force_ref, _)) = reference {
+        write_force(force_ref, &mut team_state.generalized_force_ref);
+    }
+}
+
+fn write_force(force: &GeneralizedForce, rows: &mut [[f64; 6]; MAX_HANDS_OF_TEAM]) {
+    let internal = force.internal.iter().map(Wrench::to_array);
+    let all = core::iter::once(force.external.to_array()).chain(internal);
+    for (row, wrench) in rows.iter_mut().zip(all) {
+        *row = wrench;
+    }
+}
