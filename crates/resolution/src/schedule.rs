@@ -1,0 +1,18 @@
+//! The schedule of a run.
+
+use mikoshi_config::RunSpec;
+use mikoshi_runtime::{Placement, ScheduleError, TickSchedule};
+
+/// The schedule by which all services of this run meet.
+///
+/// # Errors
+/// More robots than a team may have, or a coordination delay beyond what can be scheduled.
+pub fn tick_schedule(run: &RunSpec) -> Result<TickSchedule, ScheduleError> {
+    let placement = &run.scenario.placement;
+    let placement = Placement {
+        bridge_core: placement.bridge_core,
+        coordinator_core: placement.coordinator_core,
+        servo_cores: placement.servo_cores.clone(),
+    };
+    TickSchedule::of_team(run.robots.len(), run.scenario.coordination_delay_ticks, &placement)
+}

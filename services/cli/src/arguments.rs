@@ -1,0 +1,141 @@
+//! What can be typed.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  mikoshi run config/scenarios/hold.toml
+  mikoshi run config/scenarios/hold.toml --seed 3 --set team=two --set object.mass_kg=10
+  mikoshi plan config/scenarios/hold.toml
+  mikoshi status
+  mikoshi doctor --clean";
+
+const RUN_EXAMPLES: &str = "\
+Examples:
+  mikoshi run config/scenarios/hold.toml
+  mikoshi run config/scenarios/hold.toml --in-process --seed 2 --out /tmp/hold
+  mikoshi run config/scenarios/hold.toml --set duration_s=5 --set hybrid.start_s=1
+  mikoshi run config/scenarios/hold.toml --set hybrid.start_s=     (hybrid control stays off)
+
+Exit status:
+  0  the run met its scenario's thresholds
+  1  it did not: a robot fell, a figure out of bounds
+  2  bad usage or configuration
+  3  a fault of the system: a process died, no shared memory, no simulator
+  130, 143  interrupted, terminated";
+
+/// A team of humanoid robots carries one object.
+#[derive(Debug, Parser)]
+#[command(name = "mikoshi", version, after_help = EXAMPLES)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a scenario: one process per service, or all of them in one thread
+    #[command(after_help = RUN_EXAMPLES)]
+    Run(RunArguments),
+    /// Show what a scenario comes to: arms, matrices, gains, schedule, limits
+    Plan(PlanArguments),
+    /// List the runs of this machine and their processes
+    Status(StatusArguments),
+    /// Check whether this machine is fit to run, and say how to make it so
+    Doctor(DoctorArguments),
+}
+
+/// Which scenario, with which changes.
+#[derive(Args, Debug)]
+pub struct ScenarioArguments {
+    /// The scenario's file, such as config/scenarios/hold.toml
+    pub scenario: PathBuf,
+    /// Seed of everything random, in place of the scenario's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Put a value in place of the scenario's; an empty one takes the key away
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub overrides: Vec<(String, String)>,
+}
+
+/// `mikoshi run`.
+#[derive(Args, Debug)]
+pub struct RunArguments {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub scenario: ScenarioArguments,
+    /// Run all services in one thread; the result is the same, byte for byte
+    #[arg(long)]
+    pub in_process: bool,
+    /// Where the results go [default: a new folder runs/NAME-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace the results of an earlier run in --out
+    #[arg(long, requires = "out")]
+    pub force: bool,
+    /// No progress and no table: errors and exit status only
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// `mikoshi plan`.
+#[derive(Args, Debug)]
+pub struct PlanArguments {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub scenario: ScenarioArguments,
+    /// Print it as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi status`.
+#[derive(Args, Debug)]
+pub struct StatusArguments {
+    /// Print it as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi doctor`.
+#[derive(Args, Debug)]
+pub struct DoctorArguments {
+    /// Print it as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Remove what dead runs have left
+    #[arg(long)]
+    pub clean: bool,
+}
+
+fn key_and_value(typed: &str) -> Result<(String, String), String> {
+    match typed.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => {
+            Ok((key.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("expected KEY=VALUE, such as object.mass_kg=4".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_commands_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn overrides_are_keys_and_values_and_a_value_may_be_empty_or_hold_an_equals_sign() {
+        assert_eq!(key_and_value("a.b=4"), Ok(("a.b".into(), "4".into())));
+        assert_eq!(key_and_value("a="), Ok(("a".into(), String::new())));
+        assert_eq!(key_and_value("a=b=c"), Ok(("a".into(), "b=c".into())));
+        assert!(key_and_value("a").is_err());
+        assert!(key_and_value("=4").is_err());
+    }
+}

@@ -1,0 +1,5 @@
+//! The `mikoshi` command.
+
+fn main() -> std::process::ExitCode {
+    mikoshi::main_of_command()
+}
