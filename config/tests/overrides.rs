@@ -14,6 +14,16 @@ fn the_team_lies_beneath_the_scenario() {
     let scenario = load(&[], None);
     assert_eq!(scenario.object.mass_kg, 3.0);
     assert_eq!(scenario.robots.len(), 2);
+    // Both files have this table: it is joined key by key, and the scenario wins.
+    assert_eq!(scenario.thresholds.foot_slip_max_m, Some(0.005));
+    assert_eq!(scenario.thresholds.zmp_margin_min_m, Some(0.02));
+}
+
+#[test]
+fn ratios_of_periods_are_rounded_to_whole_ticks() {
+    let scenario = load(&[("duration_s", "0.3"), ("control_period_s", "0.1"), ("hybrid.start_s", "")], None);
+    assert_eq!(scenario.ticks(), 3, "0.3 / 0.1 is a little less than 3");
+    assert_eq!(scenario.substeps(), 100);
 }
 
 #[test]
