@@ -324,6 +324,7 @@ fn quantities_lie_in_their_ranges() {
         ("hybrid.start_s", "2", "a time before the end (2 s); leave it out for never"),
         ("physics.friction", "-1", "a finite number from 0"),
         ("sensors.force_noise_n", "-1", "a finite number from 0"),
+        ("coordination_delay_ticks", "17", "at most 16 ticks"),
         ("sensors.delay_ticks", "1001", "at most 1000 ticks"),
         ("thresholds.foot_slip_max_m", "-1", "a finite number from 0"),
         ("placement.fifo_priority", "0", "a priority from 1 to 99"),
