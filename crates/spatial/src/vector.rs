@@ -55,7 +55,9 @@ macro_rules! six_vector {
                 $name::new(X_EF.rotation * self.$first, X_EF.rotation * self.$second)
             }
             /// Whether every component is finite.
-            pub fn is_finite(&self) -> bool { self.to_vector().iter().all(|value| value.is_finite()) }
+            pub fn is_finite(&self) -> bool {
+                self.$first.iter().chain(&self.$second).all(|value| value.is_finite())
+            }
         }
 
         impl<F: CoordinateFrame> Add for $name<F> {
@@ -112,6 +114,12 @@ impl<F: CoordinateFrame> Wrench<F> {
     /// The paper's A1 writes `n_b = n_h − l × f` with the virtual stick l = `p_HB` = −`offset`.
     pub fn shifted(&self, offset: &Vector3<f64>) -> Self {
         Self::new(self.force, self.moment + offset.cross(&self.force))
+    }
+
+    /// Power \[W\] of this wrench on a body that moves with `twist` at the same reference point; work \[J\]
+    /// for a small displacement.
+    pub fn power(&self, twist: &Twist<F>) -> f64 {
+        self.force.dot(&twist.linear) + self.moment.dot(&twist.angular)
     }
 }
 
