@@ -1,12 +1,34 @@
 //! From a loaded scenario to a run.
 //!
 //! This is where files meet robots: carry postures and grasps become a posture and a base pose for
-//! every robot, or an error that says which grasp is out of reach. It knows no control of a tick, no
-//! transport and no simulator; tests of services use it as the command does.
+//! every robot, or an error that says which grasp is out of reach. It knows no control of a tick and no
+//! simulator, and opens no transport; tests of services use it as the command does.
 
 #![allow(non_snake_case)]
 
+mod error;
+mod robot;
 mod schedule;
 mod surface;
 
+pub use error::ResolveRunError;
 pub use schedule::tick_schedule;
+
+use mikoshi_config::{LoadedScenario, RunSpec};
+use robot::{Models, resolve_robot};
+
+/// The run of a scenario: every robot stands and holds at tick 0.
+///
+/// # Errors
+/// A URDF or a robot's configuration can't be used, or a grasp is out of reach.
+pub fn resolve(loaded: &LoadedScenario) -> Result<RunSpec, ResolveRunError> {
+    let scenario = &loaded.scenario;
+    let models = Models::load(loaded)?;
+    let robots = scenario
+        .robots
+        .iter()
+        .enumerate()
+        .map(|(index, member)| resolve_robot(loaded, &models, index, member))
+        .collect::<Result<_, _>>()?;
+    Ok(RunSpec { ticks: scenario.ticks(), scenario: scenario.clone(), robots })
+}

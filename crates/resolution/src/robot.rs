@@ -1,0 +1,245 @@
+//! One robot: how it stands and holds at tick 0.
+
+use crate::error::ResolveRunError;
+use crate::surface::distance_to_box;
+use mikoshi_config::robot::HandConfig;
+use mikoshi_config::scenario::{Member, Object as ObjectConfig};
+use mikoshi_config::{LoadedRobot, LoadedScenario, RobotSpec};
+use mikoshi_humanoid::Model;
+use mikoshi_humanoid::balance::{PerFoot, Side};
+use mikoshi_humanoid::ik::{IkConfig, IkGains, IkScratch, IkTargets, SettlePostureError, WholeBodyIk};
+use mikoshi_humanoid::model::{FindElementError, FrameId, PackageTable};
+use mikoshi_ipc_types::MAX_HANDS;
+use mikoshi_spatial::{Base, CoordinateFrame, Foot, Hand, Object, Pose, World};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+
+/// How far a palm may be from the surface that it holds.
+const PALM_TO_SURFACE_M: f64 = 0.020;
+
+/// A robot's own frame on the ground: midpoint between its soles, x ahead, z up.
+#[derive(Clone, Copy, Debug)]
+enum Ground {}
+impl CoordinateFrame for Ground {}
+
+/// Every model of the team, read once.
+pub(crate) struct Models<'a>(BTreeMap<&'a str, UsableModel<'a>>);
+
+/// A model whose configuration fits its URDF.
+struct UsableModel<'a> {
+    loaded: &'a LoadedRobot,
+    model: Model,
+    /// In the order of the model's joints.
+    carry_posture_rad: Vec<f64>,
+    palms: Vec<FrameId>,
+    soles: PerFoot<FrameId>,
+    waist: FrameId,
+}
+
+impl<'a> Models<'a> {
+    pub(crate) fn load(scenario: &'a LoadedScenario) -> Result<Self, ResolveRunError> {
+        let usable = |(name, loaded): (&'a String, &'a LoadedRobot)| {
+            UsableModel::load(loaded).map(|model| (name.as_str(), model))
+        };
+        scenario.models.iter().map(usable).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+impl<'a> UsableModel<'a> {
+    fn load(loaded: &'a LoadedRobot) -> Result<Self, ResolveRunError> {
+        let config = &loaded.config;
+        let folder = loaded.urdf_path.parent().unwrap_or(std::path::Path::new(""));
+        let packages = PackageTable(
+            config.packages.iter().map(|(name, path)| (name.clone(), folder.join(path))).collect(),
+        );
+        let model = Model::from_urdf(&loaded.urdf, &|mesh| packages.find(mesh))
+            .map_err(|error| loaded.error_at("urdf", format!("{}: {error}", loaded.urdf_path.display())))?;
+        let at = |key: String| move |error: FindElementError| loaded.error_at(&key, lacks(loaded, &error));
+        let link = |key: String, name: &str| model.find_frame(name).map_err(at(key));
+
+        let mut palms = vec![];
+        for (index, hand) in config.hands.iter().enumerate() {
+            palms.push(link(format!("hands.{index}.palm_link"), &hand.palm_link)?);
+            link(format!("hands.{index}.sensor_link"), &hand.sensor_link)?;
+        }
+        let mut soles = vec![];
+        for (index, foot) in config.feet.iter().enumerate() {
+            soles.push(link(format!("feet.{index}.sole_link"), &foot.sole_link)?);
+            link(format!("feet.{index}.sensor_link"), &foot.sensor_link)?;
+        }
+        let [right, left] = soles[..] else {
+            return Err(loaded.error_at("feet", format!("found {} feet, expected 2", soles.len())).into());
+        };
+        link("imu_link".to_owned(), &config.imu_link)?;
+        let waist = link("waist_link".to_owned(), &config.waist_link)?;
+
+        for name in config.carry_posture_deg.keys() {
+            model.find_joint(name).map_err(at(format!("carry_posture_deg.{name}")))?;
+        }
+        let carry_posture_rad = model
+            .joints()
+            .iter()
+            .map(|joint| {
+                let angle_deg = config.carry_posture_deg.get(&joint.name).copied().unwrap_or(0.0);
+                let angle_rad = angle_deg.to_radians();
+                if (joint.lower..=joint.upper).contains(&angle_rad) {
+                    return Ok(angle_rad);
+                }
+                let (lower, upper) = (joint.lower.to_degrees(), joint.upper.to_degrees());
+                let problem =
+                    format!("found {angle_deg}, expected {lower:.1} to {upper:.1}, the joint's limits");
+                Err(loaded.error_at(&format!("carry_posture_deg.{}", joint.name), problem))
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self { loaded, carry_posture_rad, palms, soles: PerFoot { right, left }, waist, model })
+    }
+}
+
+fn lacks(loaded: &LoadedRobot, error: &FindElementError) -> String {
+    let FindElementError { element, name, known, .. } = error;
+    format!("found {name:?}, expected a {element} of {}: {known}", loaded.urdf_path.display())
+}
+
+/// Where this robot's grasping hands are, and a posture at rest that has them there.
+pub(crate) fn resolve_robot(
+    scenario: &LoadedScenario,
+    models: &Models<'_>,
+    index: usize,
+    member: &Member,
+) -> Result<RobotSpec, ResolveRunError> {
+    let Some(usable) = models.0.get(member.model.as_str()) else {
+        let problem = format!("found {:?}, expected a model that is loaded", member.model);
+        return Err(scenario.error_at(&format!("robots.{index}.model"), problem).into());
+    };
+    let config = &usable.loaded.config;
+    let grasping_hands = grasping_hands(scenario, index, member, &config.hands)?;
+
+    let X_WG = ground_pose(member);
+    let X_WA = object_pose(&scenario.scenario.object);
+    let mut hand_in_object = vec![];
+    let mut hands = [None; MAX_HANDS];
+    for (target, &hand) in hands.iter_mut().zip(&grasping_hands) {
+        let X_WH = X_WG * carry_pose(&config.hands[hand]);
+        let X_AH = X_WA.inverse() * X_WH;
+        let distance_m = distance_to_box(&X_AH.translation, &scenario.scenario.object.size_m);
+        if distance_m.abs() > PALM_TO_SURFACE_M {
+            return Err(ResolveRunError::PalmOffSurface {
+                robot: member.name.clone(),
+                hand: config.hands[hand].name.clone(),
+                distance_m,
+                limit_m: PALM_TO_SURFACE_M,
+            });
+        }
+        *target = Some(X_WH);
+        hand_in_object.push(X_AH.to_array());
+    }
+
+    let targets = IkTargets {
+        stance: Side::Right,
+        feet: PerFoot::from_fn(|side| X_WG * standing_foot(side, config.foot_spacing_m)),
+        com: X_WG.transform_point(&Vector3::new(0.0, 0.0, config.com_height_m)),
+        waist_attitude: X_WG.rotation,
+        hands,
+    };
+    let settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
+    Ok(RobotSpec {
+        member: member.clone(),
+        config: config.clone(),
+        urdf: usable.loaded.urdf.clone(),
+        initial_base_pose: base_pose(usable, &settled, &targets).to_array(),
+        initial_posture_rad: settled,
+        grasping_hands,
+        hand_in_object,
+    })
+}
+
+fn grasping_hands(
+    scenario: &LoadedScenario,
+    index: usize,
+    member: &Member,
+    hands: &[HandConfig],
+) -> Result<Vec<usize>, ResolveRunError> {
+    let Some(names) = &member.hands else { return Ok((0..hands.len()).collect()) };
+    let find = |(place, name): (usize, &String)| {
+        hands.iter().position(|hand| hand.name == *name).ok_or_else(|| {
+            let known = hands.iter().map(|hand| hand.name.as_str()).collect::<Vec<_>>().join(", ");
+            let key = format!("robots.{index}.hands.{place}");
+            scenario.error_at(&key, format!("found {name:?}, expected one of {known}")).into()
+        })
+    };
+    names.iter().enumerate().map(find).collect()
+}
+
+/// Where a member stands: X_WG.
+fn ground_pose(member: &Member) -> Pose<World, Ground> {
+    Pose::new(Vector3::new(member.x_m, member.y_m, 0.0), heading(member.yaw_deg))
+}
+
+/// Where the object is at tick 0: X_WA.
+fn object_pose(object: &ObjectConfig) -> Pose<World, Object> {
+    Pose::new(Vector3::from(object.position_m), heading(object.yaw_deg))
+}
+
+fn heading(yaw_deg: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians())
+}
+
+/// Where a robot holds: X_GH.
+fn carry_pose(hand: &HandConfig) -> Pose<Ground, Hand> {
+    let rows = &hand.carry_rotation;
+    let matrix = Matrix3::from_fn(|row, column| rows[row][column]);
+    // The configuration's rotation is checked to be one, to the digits that people write.
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix));
+    Pose::new(Vector3::from(hand.carry_position_m), rotation)
+}
+
+fn standing_foot(side: Side, spacing_m: f64) -> Pose<Ground, Foot> {
+    let y_m = match side {
+        Side::Right => -0.5 * spacing_m,
+        Side::Left => 0.5 * spacing_m,
+    };
+    Pose::new(Vector3::new(0.0, y_m, 0.0), UnitQuaternion::identity())
+}
+
+fn settle(
+    scenario: &LoadedScenario,
+    usable: &UsableModel<'_>,
+    index: usize,
+    member: &Member,
+    grasping_hands: &[usize],
+    targets: &IkTargets,
+) -> Result<Vec<f64>, ResolveRunError> {
+    let config = IkConfig {
+        hands: grasping_hands.iter().map(|&hand| usable.palms[hand]).collect(),
+        feet: usable.soles,
+        waist: usable.waist,
+        posture: usable.carry_posture_rad.clone(),
+        period_s: scenario.scenario.control_period_s,
+        gains: IkGains::default(),
+    };
+    let ik = WholeBodyIk::new(&usable.model, config).map_err(|error| {
+        let problem = format!("found {:?}, expected a model that can be moved: {error}", member.model);
+        scenario.error_at(&format!("robots.{index}.model"), problem)
+    })?;
+    let mut scratch = IkScratch::new(&usable.model);
+    let guess = &usable.carry_posture_rad;
+    let settled = ik.settle(&usable.model, &mut scratch, guess, targets).map_err(|source| {
+        let robot = member.name.clone();
+        match source {
+            SettlePostureError::UnreachableGrasp { hand, .. } => {
+                let hand =
+                    grasping_hands.get(hand).map(|&hand| usable.loaded.config.hands[hand].name.clone());
+                ResolveRunError::HandOutOfReach { robot, hand: hand.unwrap_or_default(), source }
+            }
+            _ => ResolveRunError::NoStance { robot, source },
+        }
+    })?;
+    Ok(settled.joint_position[..usable.model.joint_count()].to_vec())
+}
+
+/// The root link in the world, by the stance foot.
+fn base_pose(usable: &UsableModel<'_>, posture_rad: &[f64], targets: &IkTargets) -> Pose<World, Base> {
+    let X_WF = targets.feet[targets.stance];
+    let X_BF: Pose<Base, Foot> = usable.model.pose_in_base(usable.soles[targets.stance], posture_rad);
+    X_WF * X_BF.inverse()
+}
