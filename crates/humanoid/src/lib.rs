@@ -12,8 +12,10 @@
 
 pub mod balance;
 pub mod gait;
+pub mod ik;
 pub mod kinematics;
 pub mod model;
 
+pub use ik::{IkConfig, IkGains, IkReport, IkScratch, IkState, IkTargets, WholeBodyIk};
 pub use kinematics::Kinematics;
 pub use model::{FrameId, Model};

@@ -22,6 +22,9 @@ use std::path::PathBuf;
 /// Most joints that a robot may have: joint sets are 64-bit masks.
 pub const MAX_JOINTS: usize = 64;
 
+/// Most grasping hands that a robot may have.
+pub const MAX_HANDS: usize = 4;
+
 /// A frame of a [`Model`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FrameId(usize);

@@ -1,0 +1,569 @@
+//! Whole-body inverse kinematics (eq. 41), closed on the commanded state.
+//!
+//! Joint increments δΘ follow the references of centre of mass, waist attitude, swinging foot and
+//! hands, with the stance foot as base. Departures from eq. 41, each with its reason:
+//! - "current" is the commanded state, not the measured one: measured angles make the droop of the
+//!   drives, divided by the position gain, a standing error.
+//! - The pseudo-inverse becomes a damped least-squares problem in a box. Position and velocity limits
+//!   of every joint hold exactly, and weights that lie orders of magnitude apart decide who gives way
+//!   where not all can be had: posture before hands, hands before feet, feet before balance.
+//! - What freedom is left returns to a preferred posture and away from limits.
+//! - In double support the other foot has a reference too, where it stands: held "where it is" it would
+//!   keep every small error of linearization.
+
+mod bounded_quadratic;
+mod settle;
+
+pub use settle::SettlePostureError;
+
+use crate::balance::{PerFoot, Side};
+use crate::kinematics::{Kinematics, joints_of};
+use crate::model::{FrameId, MAX_HANDS, MAX_JOINTS, Model};
+use bounded_quadratic::{ActiveSet, BoundedQuadratic};
+use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, log};
+use nalgebra::{Matrix3xX, Matrix6xX, UnitQuaternion, Vector3, Vector6};
+use thiserror::Error;
+
+/// What one tick's linearization leaves of an error that it could undo \[m and rad\].
+const LINEARIZATION_ERROR: f64 = 5e-5;
+
+/// Which frames the tasks of eq. 41 move, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IkConfig {
+    /// Palms, at most [`MAX_HANDS`], in the order of the robot's hands.
+    pub hands: Vec<FrameId>,
+    /// Soles.
+    pub feet: PerFoot<FrameId>,
+    /// The link whose attitude is controlled.
+    pub waist: FrameId,
+    /// The posture to which the null space returns \[rad or m\], in the order of the model.
+    pub posture: Vec<f64>,
+    /// Control period \[s\].
+    pub period_s: f64,
+    /// Weights, damping and limits.
+    pub gains: IkGains,
+}
+
+/// Weights, damping and limits of [`WholeBodyIk`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IkGains {
+    /// Weight of the centre of mass and of the waist's attitude, per m² and rad².
+    pub balance_weight: f64,
+    /// Weight of the foot that is not the base.
+    pub foot_weight: f64,
+    /// Weight of each hand.
+    pub hand_weight: f64,
+    /// λ: damping of the least squares, and weight λ² of the posture.
+    pub damping: f64,
+    /// Share of the way to the preferred posture that the null space goes in a tick.
+    pub posture_gain: f64,
+    /// Largest part of a task's error that one tick answers \[m\]: beyond it the linearization fails.
+    pub step_m: f64,
+    /// The same for attitudes \[rad\].
+    pub step_rad: f64,
+    /// How far from their position limits joints stop \[rad or m\].
+    pub limit_margin: f64,
+    /// Share of the way to a position limit that a joint may go in a tick, so that it arrives slowly.
+    pub limit_approach: f64,
+    /// Distance from a limit's margin at which the null space begins to flee it \[rad or m\].
+    pub repulsion_zone: f64,
+    /// Null-space step of a joint that stands at the margin \[rad or m\].
+    pub repulsion_step: f64,
+    /// Speed limit of joints that move one hand and nothing else, where it is below the model's
+    /// \[rad/s\].
+    pub arm_speed: Option<f64>,
+}
+
+impl Default for IkGains {
+    fn default() -> Self {
+        Self {
+            balance_weight: 1e5,
+            foot_weight: 1e3,
+            hand_weight: 1.0,
+            damping: 0.02,
+            posture_gain: 0.02,
+            step_m: 0.02,
+            step_rad: 0.05,
+            limit_margin: 0.05,
+            limit_approach: 0.2,
+            repulsion_zone: 0.15,
+            repulsion_step: 0.005,
+            arm_speed: None,
+        }
+    }
+}
+
+/// A configuration that does not fit the model.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ConfigureIkError {
+    /// More hands than fit on the wire.
+    #[error("{0} hands; expected at most {MAX_HANDS}")]
+    TooManyHands(usize),
+    /// A posture of another robot.
+    #[error("the posture has {found} joints; the model has {expected}")]
+    PostureSize {
+        /// Of the posture.
+        found: usize,
+        /// Of the model.
+        expected: usize,
+    },
+    /// A number that has to be positive and finite.
+    #[error("{name} is {value}; expected a positive number")]
+    NotPositive {
+        /// Which.
+        name: &'static str,
+        /// The value.
+        value: f64,
+    },
+}
+
+/// A tick without a solution: a reference or the state is not finite. The state is as before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("a reference or the commanded state is not finite")]
+pub struct SolveIkError;
+
+/// The commanded posture, and what the next tick starts from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IkState {
+    /// Commanded joint positions \[rad or m\]; zero past the model's joints.
+    pub joint_position: [f64; MAX_JOINTS],
+    /// The last tick's increment per period \[rad/s or m/s\].
+    pub joint_velocity: [f64; MAX_JOINTS],
+    active: ActiveSet,
+    residual: Residual,
+}
+
+impl IkState {
+    /// At rest in a posture, given in the order of the model.
+    pub fn at_rest(posture: &[f64]) -> Self {
+        let mut joint_position = [0.0; MAX_JOINTS];
+        for (position, value) in joint_position.iter_mut().zip(posture) {
+            *position = *value;
+        }
+        Self {
+            joint_position,
+            joint_velocity: [0.0; MAX_JOINTS],
+            active: ActiveSet::default(),
+            residual: Residual::default(),
+        }
+    }
+}
+
+/// What each task lacked after the last tick, at most one step of each: linear \[m\], angular \[rad\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Residual {
+    com: [f64; 2],
+    waist: [f64; 2],
+    foot: [f64; 2],
+    hands: [[f64; 2]; MAX_HANDS],
+}
+
+/// References of one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IkTargets {
+    /// The foot that is the base.
+    pub stance: Side,
+    /// Poses of both soles. The stance foot's is exact by construction.
+    pub feet: PerFoot<Pose<World, Foot>>,
+    /// Centre of mass \[m\].
+    pub com: Vector3<f64>,
+    /// Attitude of the waist.
+    pub waist_attitude: UnitQuaternion<f64>,
+    /// Poses of the hands; one without is left to the posture.
+    pub hands: [Option<Pose<World, Hand>>; MAX_HANDS],
+}
+
+/// What the commanded state is after a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IkReport {
+    /// Commanded pose of the root link.
+    pub base_pose: Pose<World, Base>,
+    /// Commanded pose of each hand; the identity past their number.
+    pub hand_poses: [Pose<World, Hand>; MAX_HANDS],
+    /// Distance of each hand from its reference \[m\].
+    pub hand_error_m: [f64; MAX_HANDS],
+    /// Angle of each hand from its reference \[rad\].
+    pub hand_error_rad: [f64; MAX_HANDS],
+    /// Distance of the centre of mass from its reference \[m\].
+    pub com_error_m: f64,
+    /// Angle of the waist from its reference \[rad\].
+    pub waist_error_rad: f64,
+    /// Distance of the foot that is not the base from its reference \[m\].
+    pub foot_error_m: f64,
+    /// Angle of that foot from its reference \[rad\].
+    pub foot_error_rad: f64,
+    /// Smallest distance of a joint from its position limits \[rad or m\].
+    pub joint_margin: f64,
+    /// Joints whose position limit bounded this tick: bit j for joint j.
+    pub at_position_limit: u64,
+    /// Joints whose velocity limit bounded this tick.
+    pub at_velocity_limit: u64,
+}
+
+/// Whole-body inverse kinematics of one robot (eq. 41). Immutable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WholeBodyIk {
+    config: IkConfig,
+    /// Largest increment of each joint in a tick.
+    speed_step: [f64; MAX_JOINTS],
+}
+
+/// Workspace of [`WholeBodyIk`]; it allocates at construction and never after.
+#[derive(Clone, Debug)]
+pub struct IkScratch {
+    /// Of the commanded state; after [`WholeBodyIk::solve`] that of the tick's end.
+    pub kinematics: Kinematics,
+    jacobian: Matrix6xX<f64>,
+    com_jacobian: Matrix3xX<f64>,
+    program: BoundedQuadratic,
+}
+
+impl IkScratch {
+    /// A workspace for a robot.
+    pub fn new(model: &Model) -> Self {
+        Self {
+            kinematics: Kinematics::new(model),
+            jacobian: Matrix6xX::zeros(model.joint_count()),
+            com_jacobian: Matrix3xX::zeros(model.joint_count()),
+            program: BoundedQuadratic::new(model.joint_count()),
+        }
+    }
+
+    /// Overwrites the workspace with NaN, for tests that nothing survives from tick to tick.
+    pub fn fill_with_nan(&mut self) {
+        self.kinematics.fill_with_nan();
+        self.jacobian.fill(f64::NAN);
+        self.com_jacobian.fill(f64::NAN);
+        self.program.fill_with_nan();
+    }
+}
+
+/// One block of rows of eq. 41.
+struct Task {
+    /// Joints with a part in it.
+    joints: u64,
+    /// What is missing, linear before angular.
+    error: Twist<World>,
+    /// What was missing after the last tick.
+    residual: [f64; 2],
+    /// Weight of the linear and of the angular rows.
+    weight: [f64; 2],
+}
+
+impl WholeBodyIk {
+    /// # Errors
+    /// The configuration does not fit the model.
+    pub fn new(model: &Model, config: IkConfig) -> Result<Self, ConfigureIkError> {
+        let n = model.joint_count();
+        if config.hands.len() > MAX_HANDS {
+            return Err(ConfigureIkError::TooManyHands(config.hands.len()));
+        }
+        if config.posture.len() != n {
+            return Err(ConfigureIkError::PostureSize { found: config.posture.len(), expected: n });
+        }
+        let gains = &config.gains;
+        for (name, value) in [
+            ("period_s", config.period_s),
+            ("balance_weight", gains.balance_weight),
+            ("foot_weight", gains.foot_weight),
+            ("hand_weight", gains.hand_weight),
+            ("damping", gains.damping),
+            ("step_m", gains.step_m),
+            ("step_rad", gains.step_rad),
+            ("limit_approach", gains.limit_approach),
+            ("repulsion_zone", gains.repulsion_zone),
+            ("arm_speed", gains.arm_speed.unwrap_or(1.0)),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ConfigureIkError::NotPositive { name, value });
+            }
+        }
+        let arms = arm_joints(model, &config);
+        let mut speed_step = [0.0; MAX_JOINTS];
+        for (j, joint) in model.joints().iter().enumerate() {
+            let cap = gains.arm_speed.filter(|_| arms >> j & 1 == 1).unwrap_or(f64::INFINITY);
+            speed_step[j] = joint.velocity.min(cap) * config.period_s;
+        }
+        Ok(Self { config, speed_step })
+    }
+
+    /// What it was made from.
+    pub fn config(&self) -> &IkConfig {
+        &self.config
+    }
+
+    /// Pose of the root link while the stance foot of `targets` stands where it should, for joint
+    /// positions in the order of the model: X_WB = X_WS X_BS⁻¹.
+    pub fn base_pose(&self, model: &Model, joint_position: &[f64], targets: &IkTargets) -> Pose<World, Base> {
+        let stance = targets.stance;
+        let X_BS: Pose<Base, Foot> = model.pose_in_base(self.config.feet[stance], joint_position);
+        targets.feet[stance] * X_BS.inverse()
+    }
+
+    /// One tick: moves the commanded state towards the references.
+    ///
+    /// # Errors
+    /// A reference or the state is not finite; the state is left as it was.
+    pub fn solve(
+        &self,
+        model: &Model,
+        state: &mut IkState,
+        scratch: &mut IkScratch,
+        targets: &IkTargets,
+    ) -> Result<IkReport, SolveIkError> {
+        self.step(model, state, scratch, targets, &self.speed_step)
+    }
+
+    fn step(
+        &self,
+        model: &Model,
+        state: &mut IkState,
+        scratch: &mut IkScratch,
+        targets: &IkTargets,
+        speed_step: &[f64; MAX_JOINTS],
+    ) -> Result<IkReport, SolveIkError> {
+        let X_WB = self.base_pose(model, &state.joint_position, targets);
+        scratch.kinematics.update(model, &X_WB, &state.joint_position);
+        self.pose_tasks(model, state, scratch, targets);
+        let at_position_bound = self.pose_bounds(model, state, scratch, speed_step);
+
+        let mut active = state.active;
+        scratch.program.minimize(&mut active).map_err(|_| SolveIkError)?;
+        let mut next = *state;
+        next.active = active;
+        for (j, joint) in model.joints().iter().enumerate() {
+            let increment = scratch.program.solution[j];
+            next.joint_position[j] = (state.joint_position[j] + increment).clamp(joint.lower, joint.upper);
+            next.joint_velocity[j] = increment / self.config.period_s;
+        }
+
+        let base_pose = self.base_pose(model, &next.joint_position, targets);
+        scratch.kinematics.update(model, &base_pose, &next.joint_position);
+        let active = active.lower | active.upper;
+        let mut report = IkReport {
+            base_pose,
+            hand_poses: [Pose::identity(); MAX_HANDS],
+            hand_error_m: [0.0; MAX_HANDS],
+            hand_error_rad: [0.0; MAX_HANDS],
+            com_error_m: 0.0,
+            waist_error_rad: 0.0,
+            foot_error_m: 0.0,
+            foot_error_rad: 0.0,
+            joint_margin: joint_margin(model, &next.joint_position),
+            at_position_limit: active & at_position_bound,
+            at_velocity_limit: active & !at_position_bound,
+        };
+        self.measure(model, &scratch.kinematics, targets, &mut report, &mut next.residual);
+        *state = next;
+        Ok(report)
+    }
+
+    /// Normal equations of all tasks, damping and posture.
+    fn pose_tasks(&self, model: &Model, state: &IkState, scratch: &mut IkScratch, targets: &IkTargets) {
+        let IkScratch { kinematics, jacobian, com_jacobian, program } = scratch;
+        let (config, gains, residual) = (&self.config, &self.config.gains, &state.residual);
+        let stance = config.feet[targets.stance];
+        let stance_path = model.path(model.frame(stance).body);
+        let moving = |frame: FrameId| model.path(model.frame(frame).body) ^ stance_path;
+
+        program.hessian.fill(0.0);
+        program.linear = [0.0; MAX_JOINTS];
+        let damping = gains.damping * gains.damping;
+        for (j, joint) in model.joints().iter().enumerate() {
+            let q = state.joint_position[j];
+            let room = gains.limit_margin + gains.repulsion_zone;
+            let nearness = |distance: f64| ((room - distance) / gains.repulsion_zone).clamp(0.0, 1.0);
+            let flee = nearness(q - joint.lower).powi(2) - nearness(joint.upper - q).powi(2);
+            let posture_step = gains.posture_gain * (config.posture[j] - q) + gains.repulsion_step * flee;
+            program.hessian[(j, j)] = damping;
+            program.linear[j] = damping * posture_step;
+        }
+
+        kinematics.stance_com_jacobian(model, stance, com_jacobian);
+        jacobian.fill(0.0);
+        jacobian.fixed_rows_mut::<3>(0).copy_from(com_jacobian);
+        self.add_task(
+            program,
+            jacobian,
+            &Task {
+                joints: all_joints(model),
+                error: Twist::new(targets.com - kinematics.com(), Vector3::zeros()),
+                residual: residual.com,
+                weight: [gains.balance_weight, 0.0],
+            },
+        );
+
+        let waist: Pose<World, Base> = kinematics.frame_pose(model, config.waist);
+        kinematics.stance_jacobian(model, config.waist, stance, jacobian);
+        self.add_task(
+            program,
+            jacobian,
+            &Task {
+                joints: moving(config.waist),
+                error: Twist::new(Vector3::zeros(), attitude_error(&waist.rotation, &targets.waist_attitude)),
+                residual: residual.waist,
+                weight: [0.0, gains.balance_weight],
+            },
+        );
+
+        let swing = targets.stance.opposite();
+        let foot: Pose<World, Foot> = kinematics.frame_pose(model, config.feet[swing]);
+        kinematics.stance_jacobian(model, config.feet[swing], stance, jacobian);
+        self.add_task(
+            program,
+            jacobian,
+            &Task {
+                joints: moving(config.feet[swing]),
+                error: foot.displacement_to(&targets.feet[swing]),
+                residual: residual.foot,
+                weight: [gains.foot_weight; 2],
+            },
+        );
+
+        for ((&frame, target), &residual) in config.hands.iter().zip(&targets.hands).zip(&residual.hands) {
+            let Some(target) = target else { continue };
+            let hand: Pose<World, Hand> = kinematics.frame_pose(model, frame);
+            kinematics.stance_jacobian(model, frame, stance, jacobian);
+            self.add_task(
+                program,
+                jacobian,
+                &Task {
+                    joints: moving(frame),
+                    error: hand.displacement_to(target),
+                    residual,
+                    weight: [gains.hand_weight; 2],
+                },
+            );
+        }
+    }
+
+    /// Adds Jᵀ W J to the matrix and Jᵀ W e to the vector of the program, and damping for what the task
+    /// lacks.
+    ///
+    /// Gauss-Newton leaves out the curvature of a task, about weight × residual × lever for each joint.
+    /// Where a reference is out of reach the residual stays, and near a stretched limb the steps would
+    /// overshoot and chatter; damping of that size prevents it (compare Sugihara, "Solvability-
+    /// unconcerned inverse kinematics by the Levenberg-Marquardt method", 2011). A residual that this
+    /// tick can undo adds nothing, so what is followed is followed without lag.
+    fn add_task(&self, program: &mut BoundedQuadratic, jacobian: &Matrix6xX<f64>, task: &Task) {
+        let [w_linear, w_angular] = task.weight;
+        let weight = Vector6::new(w_linear, w_linear, w_linear, w_angular, w_angular, w_angular);
+        let gains = &self.config.gains;
+        let error = Twist::<World>::new(
+            shortened(task.error.linear, gains.step_m),
+            shortened(task.error.angular, gains.step_rad),
+        )
+        .to_vector();
+        for a in joints_of(task.joints) {
+            let column = jacobian.column(a);
+            let weighted = column.component_mul(&weight);
+            program.linear[a] += weighted.dot(&error);
+            for b in joints_of(task.joints & (u64::MAX >> (63 - a))) {
+                program.hessian[(a, b)] += weighted.dot(&jacobian.column(b));
+            }
+            let lever = [column.fixed_rows::<3>(0).norm(), column.fixed_rows::<3>(3).norm()];
+            program.hessian[(a, a)] +=
+                2.0 * (w_linear * task.residual[0] * lever[0] + w_angular * task.residual[1] * lever[1]);
+        }
+    }
+
+    /// Bounds of every joint's increment; the set of joints of which the nearer bound is the position
+    /// limit's.
+    fn pose_bounds(
+        &self,
+        model: &Model,
+        state: &IkState,
+        scratch: &mut IkScratch,
+        speed_step: &[f64; MAX_JOINTS],
+    ) -> u64 {
+        let gains = &self.config.gains;
+        let program = &mut scratch.program;
+        let mut by_position = 0;
+        for (j, (joint, &speed)) in model.joints().iter().zip(speed_step).enumerate() {
+            let q = state.joint_position[j];
+            // Never more margin than would leave room.
+            let margin = gains.limit_margin.min(0.25 * (joint.upper - joint.lower));
+            let to_upper = gains.limit_approach * (joint.upper - margin - q);
+            let to_lower = gains.limit_approach * (joint.lower + margin - q);
+            if to_upper < speed || to_lower > -speed {
+                by_position |= 1 << j;
+            }
+            // A joint beyond its margin comes back, as fast as its speed limit allows.
+            program.upper[j] = to_upper.clamp(-speed, speed);
+            program.lower[j] = to_lower.clamp(-speed, speed);
+        }
+        by_position
+    }
+
+    /// How far the commanded state is from the references.
+    fn measure(
+        &self,
+        model: &Model,
+        kinematics: &Kinematics,
+        targets: &IkTargets,
+        report: &mut IkReport,
+        residual: &mut Residual,
+    ) {
+        let (config, gains) = (&self.config, &self.config.gains);
+        let capped = |linear: f64, angular: f64| {
+            let beyond = |error: f64, step: f64| (error.min(step) - LINEARIZATION_ERROR).max(0.0);
+            [beyond(linear, gains.step_m), beyond(angular, gains.step_rad)]
+        };
+        let distances = |error: Twist<World>| (error.linear.norm(), error.angular.norm());
+
+        report.com_error_m = (targets.com - kinematics.com()).norm();
+        residual.com = capped(report.com_error_m, 0.0);
+
+        let waist: Pose<World, Base> = kinematics.frame_pose(model, config.waist);
+        report.waist_error_rad = attitude_error(&waist.rotation, &targets.waist_attitude).norm();
+        residual.waist = capped(0.0, report.waist_error_rad);
+
+        let swing = targets.stance.opposite();
+        let foot: Pose<World, Foot> = kinematics.frame_pose(model, config.feet[swing]);
+        (report.foot_error_m, report.foot_error_rad) = distances(foot.displacement_to(&targets.feet[swing]));
+        residual.foot = capped(report.foot_error_m, report.foot_error_rad);
+
+        residual.hands = [[0.0; 2]; MAX_HANDS];
+        for (i, &frame) in config.hands.iter().enumerate().take(MAX_HANDS) {
+            report.hand_poses[i] = kinematics.frame_pose(model, frame);
+            if let Some(target) = &targets.hands[i] {
+                let (linear, angular) = distances(report.hand_poses[i].displacement_to(target));
+                (report.hand_error_m[i], report.hand_error_rad[i]) = (linear, angular);
+                residual.hands[i] = capped(linear, angular);
+            }
+        }
+    }
+}
+
+/// Rotation vector from one attitude to another, in world axes.
+fn attitude_error(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> Vector3<f64> {
+    log(&(to * from.inverse()))
+}
+
+/// The vector, or the part of it that has length `longest`.
+fn shortened(vector: Vector3<f64>, longest: f64) -> Vector3<f64> {
+    let norm = vector.norm();
+    if norm > longest { vector * (longest / norm) } else { vector }
+}
+
+/// Smallest distance of a joint from its position limits; negative beyond them.
+pub fn joint_margin(model: &Model, joint_position: &[f64]) -> f64 {
+    let margins = model.joints().iter().zip(joint_position);
+    margins.map(|(joint, q)| (q - joint.lower).min(joint.upper - q)).fold(f64::INFINITY, f64::min)
+}
+
+fn all_joints(model: &Model) -> u64 {
+    (0..model.joint_count()).fold(0, |set, j| set | 1 << j)
+}
+
+/// The joints that move exactly one hand, and no foot.
+fn arm_joints(model: &Model, config: &IkConfig) -> u64 {
+    let path = |&frame: &FrameId| model.path(model.frame(frame).body);
+    let feet = Side::BOTH.iter().fold(0, |set, &side| set | path(&config.feet[side]));
+    let (mut once, mut more) = (0, 0);
+    for hand in config.hands.iter().map(path) {
+        more |= once & hand;
+        once |= hand;
+    }
+    once & !more & !feet
+}
