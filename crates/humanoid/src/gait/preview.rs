@@ -1,6 +1,6 @@
 //! Preview control of the cart-table model (Kajita et al., ICRA 2003; Katayama et al. 1985).
 
-use super::riccati::solve_discrete_riccati;
+use super::riccati::{feedback_gain, solve_discrete_riccati};
 use crate::balance::GRAVITY_M_S2;
 use nalgebra::{Matrix3, Matrix4, RowVector3, Vector2, Vector3, Vector4};
 
@@ -110,7 +110,7 @@ impl PreviewControl {
         let p = solve_discrete_riccati(&a, &b, &q, jerk_weight).ok_or(SolvePreviewError::NoSolution)?;
 
         let scale = 1.0 / (jerk_weight + (b.transpose() * p * b).x);
-        let k = b.transpose() * p * a * scale;
+        let k = feedback_gain(&a, &b, &p, jerk_weight);
         let closed_transposed = (a - b * k).transpose();
         let gain_of = |x: &Vector4<f64>| b.dot(x) * scale;
 
