@@ -1,1 +1,33 @@
 //! The physical world: MuJoCo behind Mikoshi's frames.
+//!
+//! This crate knows physics, drives, sensors and contacts. It knows no control: what robots do is in
+//! their joint commands, and all that it shares with those who compute them is the description of the
+//! robots.
+//!
+//! # Glossary
+//! - **tick**: one period of control; **step**: one period of physics, several a tick.
+//! - **truth**: what the simulator knows, for observers; **readings**: what sensors say, for services.
+//! - **hands** are grasping hands, in the order of [`RobotSpec::grasping_hands`]; index i of a frame's
+//!   hands is the i-th of them.
+//!
+//! [`RobotSpec::grasping_hands`]: mikoshi_config::RobotSpec::grasping_hands
+
+mod error;
+mod grasp;
+mod layout;
+mod logging;
+mod mjcf;
+mod pose;
+mod random;
+mod readings;
+mod robot;
+mod support;
+mod tally;
+mod truth;
+mod world;
+
+pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
+pub use world::World;
+
+/// Standard gravity as the simulated world has it.
+pub const GRAVITY_M_S2: f64 = 9.81;

@@ -1,0 +1,80 @@
+//! Why a world cannot be built, and why a step of it cannot be trusted.
+
+use mikoshi_humanoid::model::{FindElementError, LoadModelError};
+use thiserror::Error;
+
+/// A run that no physical world can be built from.
+#[derive(Debug, Error)]
+pub enum BuildWorldError {
+    /// A robot's description cannot be used.
+    #[error("robot '{robot}': {source}")]
+    Model {
+        /// The robot.
+        robot: String,
+        /// What is wrong with its URDF.
+        source: LoadModelError,
+    },
+    /// A robot's configuration names what its URDF lacks.
+    #[error("robot '{robot}': {source}")]
+    Element {
+        /// The robot.
+        robot: String,
+        /// What is missing.
+        source: FindElementError,
+    },
+    /// No drive is configured for a joint.
+    #[error("robot '{robot}': no pattern of [[drives]] matches joint '{joint}'")]
+    NoDrive {
+        /// The robot.
+        robot: String,
+        /// The joint.
+        joint: String,
+    },
+    /// One force sensor carries another, so what each of them carries is not defined.
+    #[error(
+        "robot '{robot}': sensor '{outer}' carries sensor '{inner}'; expected one sensor per hand or foot"
+    )]
+    NestedSensors {
+        /// The robot.
+        robot: String,
+        /// The sensor nearer to the trunk.
+        outer: String,
+        /// The other.
+        inner: String,
+    },
+    /// The run contradicts itself.
+    #[error("{place}: {what}")]
+    Inconsistent {
+        /// Robot or section.
+        place: String,
+        /// What was found, and what was expected.
+        what: String,
+    },
+    /// The simulator's own objection.
+    #[error("MuJoCo rejects the world: {0}")]
+    Simulator(String),
+}
+
+/// A step whose result is not physics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum StepWorldError {
+    /// There is not one command for each robot.
+    #[error("the number of joint commands is not the number of robots")]
+    CommandCount,
+    /// A position, velocity or acceleration became NaN, infinite or enormous.
+    #[error("the simulated world diverged")]
+    Diverged,
+    /// The simulator had no room for all contacts or constraints, and left some out.
+    #[error("the simulator ran out of memory for contacts")]
+    OutOfMemory,
+}
+
+/// A checkpoint that does not belong to this world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("the checkpoint has {found} bytes, this world needs {expected}")]
+pub struct LoadWorldError {
+    /// Bytes that were given.
+    pub found: usize,
+    /// Bytes that are needed.
+    pub expected: usize,
+}

@@ -1,0 +1,212 @@
+//! Where the simulator keeps what the frames need: addresses, found once by name.
+
+use crate::BuildWorldError;
+use crate::grasp::GraspSite;
+use crate::mjcf::{self, FLOOR, OBJECT, qualified};
+use crate::robot::Robot;
+use mikoshi_humanoid::model::FrameId;
+use mujoco_rs::prelude::{MjModel, MjtObjBase};
+use nalgebra::Vector2;
+
+/// The whole world's addresses.
+pub struct Layout {
+    pub robots: Vec<RobotLayout>,
+    pub object: BodyLayout,
+    /// Whose each geom is.
+    pub geoms: Vec<GeomOwner>,
+}
+
+/// A body on a free joint.
+#[derive(Clone, Copy)]
+pub struct BodyLayout {
+    pub body: usize,
+    /// In the velocities: linear in world axes, angular in the body's.
+    pub dof: usize,
+}
+
+/// One robot's addresses.
+pub struct RobotLayout {
+    pub base: BodyLayout,
+    pub weight_n: f64,
+    pub initial_base_height_m: f64,
+    pub joints: Vec<JointLayout>,
+    /// Grasping hands.
+    pub hands: Vec<HandLayout>,
+    pub feet: Vec<FootLayout>,
+    /// In the sensor data.
+    pub gyro: usize,
+    /// In the sensor data.
+    pub accelerometer: usize,
+}
+
+/// A joint and its drive.
+pub struct JointLayout {
+    pub qpos: usize,
+    pub dof: usize,
+    pub actuator: usize,
+    pub kp: f64,
+    pub kv: f64,
+    pub effort: f64,
+}
+
+/// A force/torque sensor, in the sensor data.
+#[derive(Clone, Copy)]
+pub struct ForceTorqueLayout {
+    pub force: usize,
+    pub torque: usize,
+}
+
+/// A grasping hand.
+pub struct HandLayout {
+    pub sensor: ForceTorqueLayout,
+    pub palm_site: usize,
+    pub palm_body: usize,
+    /// Where on the object the palm is pulled to.
+    pub object_site: usize,
+    /// The weld, where there is one.
+    pub equality: Option<usize>,
+}
+
+/// A foot.
+pub struct FootLayout {
+    pub sensor: ForceTorqueLayout,
+    pub sole_site: usize,
+    /// In the sole's frame.
+    pub corners: [Vector2<f64>; 4],
+}
+
+/// Whose a geom is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GeomOwner {
+    Floor,
+    Object,
+    /// A robot's foot.
+    Foot {
+        robot: usize,
+        foot: usize,
+    },
+    /// Any other part of a robot.
+    Part {
+        robot: usize,
+    },
+}
+
+impl Layout {
+    pub fn of(model: &MjModel, robots: &[Robot], grasps: &[GraspSite]) -> Result<Self, BuildWorldError> {
+        let find = Finder(model);
+        let mut grasps = grasps.iter();
+        let robots_layout = robots.iter().map(|robot| find.robot(robot, &mut grasps));
+        let robots_layout = robots_layout.collect::<Result<_, _>>()?;
+        let object = find.body(OBJECT)?;
+        let geoms = (0..model.ngeom() as usize).map(|geom| find.owner_of(geom, object.body, robots));
+        Ok(Self { robots: robots_layout, object, geoms: geoms.collect::<Result<_, _>>()? })
+    }
+}
+
+struct Finder<'a>(&'a MjModel);
+
+impl Finder<'_> {
+    fn id(&self, kind: MjtObjBase, name: &str) -> Result<usize, BuildWorldError> {
+        self.0
+            .name_to_id(kind, name)
+            .ok_or_else(|| BuildWorldError::Simulator(format!("no '{name}' among the {kind:?}")))
+    }
+
+    fn body(&self, name: &str) -> Result<BodyLayout, BuildWorldError> {
+        let body = self.id(MjtObjBase::mjOBJ_BODY, name)?;
+        let joint = self.0.body_jntadr()[body] as usize;
+        Ok(BodyLayout { body, dof: self.0.jnt_dofadr()[joint] as usize })
+    }
+
+    fn sensor_pair(&self, names: [String; 2]) -> Result<[usize; 2], BuildWorldError> {
+        let [first, second] =
+            names.map(|name| Ok(self.0.sensor_adr()[self.id(MjtObjBase::mjOBJ_SENSOR, &name)?] as usize));
+        Ok([first?, second?])
+    }
+
+    fn robot<'g>(
+        &self,
+        robot: &Robot,
+        grasps: &mut impl Iterator<Item = &'g GraspSite>,
+    ) -> Result<RobotLayout, BuildWorldError> {
+        let model = &robot.model;
+        let name_of = |frame: FrameId| qualified(robot.name(), &model.frame(frame).name);
+        let site = |frame: FrameId| self.id(MjtObjBase::mjOBJ_SITE, &name_of(frame));
+        let force_torque = |frame: FrameId| -> Result<_, BuildWorldError> {
+            let names = mjcf::force_and_torque(robot.name(), &model.frame(frame).name);
+            let [force, torque] = self.sensor_pair(names)?;
+            Ok(ForceTorqueLayout { force, torque })
+        };
+
+        let joints = model.joints().iter().zip(&robot.drives).map(|(joint, drive)| {
+            let name = qualified(robot.name(), &joint.name);
+            let id = self.id(MjtObjBase::mjOBJ_JOINT, &name)?;
+            Ok(JointLayout {
+                qpos: self.0.jnt_qposadr()[id] as usize,
+                dof: self.0.jnt_dofadr()[id] as usize,
+                actuator: self.id(MjtObjBase::mjOBJ_ACTUATOR, &name)?,
+                kp: drive.kp_nm_rad,
+                kv: drive.kv_nms_rad,
+                effort: joint.effort,
+            })
+        });
+        let hands = robot.hands.iter().zip(grasps).map(|(hand, grasp)| {
+            let palm_site = site(hand.frame)?;
+            Ok(HandLayout {
+                sensor: force_torque(hand.sensor)?,
+                palm_site,
+                palm_body: self.0.site_bodyid()[palm_site] as usize,
+                object_site: self.id(MjtObjBase::mjOBJ_SITE, &grasp.site)?,
+                equality: self.0.name_to_id(MjtObjBase::mjOBJ_EQUALITY, &grasp.palm),
+            })
+        });
+        let feet = robot.feet.iter().zip(&robot.spec.config.feet).map(|(foot, config)| {
+            let [x_min, x_max, y_min, y_max] = config.sole_m;
+            let corners = [(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)];
+            Ok(FootLayout {
+                sensor: force_torque(foot.sensor)?,
+                sole_site: site(foot.frame)?,
+                corners: corners.map(|(x, y)| Vector2::new(x, y)),
+            })
+        });
+        let imu = mjcf::gyro_and_accelerometer(robot.name(), &model.frame(robot.imu).name);
+        let [gyro, accelerometer] = self.sensor_pair(imu)?;
+        Ok(RobotLayout {
+            base: self.body(&qualified(robot.name(), &model.bodies()[0].name))?,
+            weight_n: model.total_mass_kg() * crate::GRAVITY_M_S2,
+            initial_base_height_m: robot.spec.initial_base_pose[2],
+            joints: joints.collect::<Result<_, BuildWorldError>>()?,
+            hands: hands.collect::<Result<_, BuildWorldError>>()?,
+            feet: feet.collect::<Result<_, BuildWorldError>>()?,
+            gyro,
+            accelerometer,
+        })
+    }
+
+    fn owner_of(&self, geom: usize, object: usize, robots: &[Robot]) -> Result<GeomOwner, BuildWorldError> {
+        let body = self.0.geom_bodyid()[geom] as usize;
+        if body == object {
+            return Ok(GeomOwner::Object);
+        }
+        let name = self.0.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+        if name == FLOOR {
+            return Ok(GeomOwner::Floor);
+        }
+        // ROBOT/LINK#INDEX; a robot's name may hold a slash too, so whole names are compared.
+        let link = name.rsplit_once('#').map_or(name, |(link, _)| link);
+        for (index, robot) in robots.iter().enumerate() {
+            let frame =
+                robot.frames().find(|&id| qualified(robot.name(), &robot.model.frame(id).name) == link);
+            if let Some(frame) = frame {
+                let carries = |foot: &crate::robot::Extremity| {
+                    robot.model.frame(foot.frame).body == robot.model.frame(frame).body
+                };
+                return Ok(match robot.feet.iter().position(carries) {
+                    Some(foot) => GeomOwner::Foot { robot: index, foot },
+                    None => GeomOwner::Part { robot: index },
+                });
+            }
+        }
+        Err(BuildWorldError::Simulator(format!("geom '{name}' is nobody's")))
+    }
+}

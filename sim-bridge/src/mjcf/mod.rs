@@ -1,0 +1,130 @@
+//! The world of a run as MJCF, MuJoCo's own language.
+//!
+//! # What is modelled
+//! Every robot floats; its joints have the drives' armature and position servos whose torque ends at
+//! the URDF's effort. What a wrist or ankle sensor carries is a body of its own, so that the sensor
+//! measures what passes through it. The grasp is a site on the object for each hand, displaced from
+//! where the hand truly is by the grasp offset: a weld or a spring pulls the palm to it.
+//!
+//! # What touches what
+//! Everything touches everything, except bodies that are neighbours in a robot (no colliding body lies
+//! between them) and a grasping hand with the object.
+//!
+//! # Names
+//! Bodies, joints, actuators and sites are `ROBOT/LINK`, geoms `ROBOT/LINK#0`, `#1` …; `floor` and
+//! `object` stand alone.
+
+mod robot;
+mod text;
+
+pub use robot::{force_and_torque, gyro_and_accelerometer};
+
+use crate::GRAVITY_M_S2;
+use crate::grasp::GraspSite;
+use crate::robot::{Robot, isometry};
+use core::fmt::Write;
+use mikoshi_config::Scenario;
+use mikoshi_config::scenario::Grasp;
+use text::{escape, numbers, pose};
+
+/// The floor's and the object's names.
+pub const FLOOR: &str = "floor";
+/// The object's body, geom and joint.
+pub const OBJECT: &str = "object";
+
+/// `ROBOT/ELEMENT`.
+pub fn qualified(robot: &str, element: &str) -> String {
+    format!("{robot}/{element}")
+}
+
+/// The whole world.
+///
+/// Contacts: an elliptic cone with impratio 100. With the pyramidal cone soles creep under a constant
+/// tangential load, since its friction is regularised.
+pub fn world(scenario: &Scenario, robots: &[Robot], grasps: &[GraspSite]) -> String {
+    let mut xml = String::new();
+    // Writing to a String cannot fail.
+    write_world(&mut xml, scenario, robots, grasps).unwrap_or_default();
+    xml
+}
+
+fn write_world(
+    xml: &mut String,
+    scenario: &Scenario,
+    robots: &[Robot],
+    grasps: &[GraspSite],
+) -> core::fmt::Result {
+    let friction = scenario.physics.friction;
+    writeln!(
+        xml,
+        r#"<mujoco model="{}">
+  <compiler angle="radian" autolimits="true" inertiafromgeom="false"/>
+  <option timestep="{}" integrator="implicitfast" solver="Newton" jacobian="sparse" cone="elliptic" impratio="100" gravity="0 0 {}">
+    <flag autoreset="disable"/>
+  </option>
+  <default>
+    <geom condim="3" friction="{friction} 0.005 0.0001" solref="0.02 1" solimp="0.9 0.95 0.001"/>
+  </default>"#,
+        escape(&scenario.name),
+        scenario.physics.step_s,
+        -GRAVITY_M_S2,
+    )?;
+    robot::write_meshes(xml, robots)?;
+    writeln!(xml, "  <worldbody>")?;
+    writeln!(xml, r#"    <geom name="{FLOOR}" type="plane" size="20 20 1"/>"#)?;
+    write_object(xml, scenario, grasps)?;
+    for robot in robots {
+        robot::write_bodies(xml, robot)?;
+    }
+    writeln!(xml, "  </worldbody>\n  <actuator>")?;
+    for robot in robots {
+        robot::write_actuators(xml, robot)?;
+    }
+    writeln!(xml, "  </actuator>\n  <sensor>")?;
+    for robot in robots {
+        robot::write_sensors(xml, robot)?;
+    }
+    writeln!(xml, "  </sensor>\n  <contact>")?;
+    for robot in robots {
+        robot::write_exclusions(xml, robot)?;
+    }
+    writeln!(xml, "  </contact>")?;
+    if matches!(scenario.grasp, Grasp::Weld { .. }) {
+        writeln!(xml, "  <equality>")?;
+        for grasp in grasps {
+            writeln!(
+                xml,
+                r#"    <weld name="{0}" site1="{0}" site2="{1}" solref="0.02 1"/>"#,
+                escape(&grasp.palm),
+                escape(&grasp.site),
+            )?;
+        }
+        writeln!(xml, "  </equality>")?;
+    }
+    writeln!(xml, "</mujoco>")
+}
+
+fn write_object(xml: &mut String, scenario: &Scenario, grasps: &[GraspSite]) -> core::fmt::Result {
+    let object = &scenario.object;
+    let [x, y, z] = object.size_m;
+    let half_yaw = 0.5 * object.yaw_deg.to_radians();
+    // A homogeneous box.
+    let inertia = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| object.mass_kg * sum / 12.0);
+    writeln!(
+        xml,
+        r#"    <body name="{OBJECT}" pos="{}" quat="{} 0 0 {}">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="{}" diaginertia="{}"/>
+      <geom name="{OBJECT}" type="box" size="{}"/>"#,
+        numbers(&object.position_m),
+        half_yaw.cos(),
+        half_yaw.sin(),
+        object.mass_kg,
+        numbers(&inertia),
+        numbers(&[0.5 * x, 0.5 * y, 0.5 * z]),
+    )?;
+    for grasp in grasps {
+        writeln!(xml, r#"      <site name="{}" {}/>"#, escape(&grasp.site), pose(&grasp.pose_in_object))?;
+    }
+    writeln!(xml, "    </body>")
+}

@@ -1,0 +1,122 @@
+//! What is summed up over the physics steps of one tick, for one robot.
+
+use crate::layout::{GeomOwner, Layout, RobotLayout};
+use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS};
+use mikoshi_spatial::{World, Wrench};
+use mujoco_rs::prelude::{MjData, MjModel};
+use nalgebra::{Matrix3, Vector3};
+
+/// Sums over the physics steps of one tick.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    steps: u32,
+    torque_sum_nm: [f64; MAX_JOINTS],
+    ground_sum: [Wrench<World>; MAX_FEET],
+    /// Largest torque that each drive asked for, before its limit.
+    pub torque_peak_nm: [f64; MAX_JOINTS],
+    /// Bit j: drive j stood at its limit.
+    pub saturated_joints: u64,
+    /// Something else than a foot touched the floor.
+    pub is_on_the_floor: bool,
+}
+
+impl Tally {
+    /// Of no step.
+    pub fn empty() -> Self {
+        Self {
+            steps: 0,
+            torque_sum_nm: [0.0; MAX_JOINTS],
+            ground_sum: [Wrench::zero(); MAX_FEET],
+            torque_peak_nm: [0.0; MAX_JOINTS],
+            saturated_joints: 0,
+            is_on_the_floor: false,
+        }
+    }
+
+    /// Whether no step has been counted.
+    pub fn is_empty(&self) -> bool {
+        self.steps == 0
+    }
+
+    /// Torque that a drive applied, averaged over the steps.
+    pub fn mean_torque_nm(&self, joint: usize) -> f64 {
+        self.torque_sum_nm[joint] / f64::from(self.steps.max(1))
+    }
+
+    /// Wrench of the ground on a foot about the world's origin, averaged over the steps.
+    pub fn mean_ground_wrench(&self, foot: usize) -> Wrench<World> {
+        self.ground_sum[foot] * (1.0 / f64::from(self.steps.max(1)))
+    }
+
+    /// Before a step: what the drives ask for, kp (ctrl − q) − kv q̇.
+    pub fn count_demands(&mut self, data: &MjData<Box<MjModel>>, layout: &RobotLayout) {
+        let (ctrl, qpos, qvel) = (data.ctrl(), data.qpos(), data.qvel());
+        for (index, joint) in layout.joints.iter().enumerate() {
+            let demand_nm =
+                (joint.kp * (ctrl[joint.actuator] - qpos[joint.qpos]) - joint.kv * qvel[joint.dof]).abs();
+            self.torque_peak_nm[index] = self.torque_peak_nm[index].max(demand_nm);
+            self.saturated_joints |= u64::from(demand_nm >= joint.effort) << index;
+        }
+    }
+
+    /// After a step: what the drives applied.
+    pub fn count_torques(&mut self, data: &MjData<Box<MjModel>>, layout: &RobotLayout) {
+        self.steps += 1;
+        let applied = data.actuator_force();
+        for (sum_nm, joint) in self.torque_sum_nm.iter_mut().zip(&layout.joints) {
+            *sum_nm += applied[joint.actuator];
+        }
+    }
+}
+
+/// Contacts of one tick that nobody intended: all but those of a foot with the floor.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unintended {
+    /// The largest number at once.
+    pub count: u64,
+    /// Geoms of the first, plus one.
+    pub first_pair: [u64; 2],
+}
+
+/// After a step, while its forces and contacts still stand: sorts all contacts.
+pub fn count_contacts(
+    data: &MjData<Box<MjModel>>,
+    layout: &Layout,
+    tallies: &mut [Tally],
+    unintended: &mut Unintended,
+) {
+    let mut count = 0;
+    for (index, contact) in data.contact().iter().enumerate() {
+        // Contacts within reach that don't push.
+        if contact.efc_address < 0 {
+            continue;
+        }
+        let geoms = [contact.geom1, contact.geom2].map(|geom| geom as usize);
+        let owners = geoms.map(|geom| layout.geoms[geom]);
+        // MuJoCo's contact force is what the first geom does to the second.
+        let on_the_floor = match owners {
+            [GeomOwner::Floor, other] => Some((other, 1.0)),
+            [other, GeomOwner::Floor] => Some((other, -1.0)),
+            _ => None,
+        };
+        match on_the_floor {
+            Some((GeomOwner::Foot { robot, foot }, sign)) => {
+                let [normal, first, second, spin, first_roll, second_roll] = data.contact_force(index);
+                // The frame's rows are the contact's axes, the normal first.
+                let axes = Matrix3::from_row_slice(&contact.frame).transpose() * sign;
+                let force = axes * Vector3::new(normal, first, second);
+                let moment = axes * Vector3::new(spin, first_roll, second_roll);
+                tallies[robot].ground_sum[foot] +=
+                    Wrench::new(force, moment).shifted(&Vector3::from(contact.pos));
+                continue;
+            }
+            Some((GeomOwner::Part { robot }, _)) => tallies[robot].is_on_the_floor = true,
+            _ => {}
+        }
+        count += 1;
+        if unintended.first_pair == [0; 2] {
+            unintended.first_pair = geoms.map(|geom| geom as u64 + 1);
+        }
+    }
+    unintended.count = unintended.count.max(count);
+}

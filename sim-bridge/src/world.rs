@@ -1,0 +1,350 @@
+//! The world of a run, tick by tick.
+
+use crate::grasp::{self, Spring};
+use crate::layout::Layout;
+use crate::readings::{self, Noise};
+use crate::robot::Robot;
+use crate::tally::{self, Tally, Unintended};
+use crate::truth;
+use crate::{BuildWorldError, LoadWorldError, StepWorldError, logging, mjcf};
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, RobotTruth, Sensors};
+use mikoshi_spatial::Wrench;
+use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};
+use nalgebra::Vector3;
+
+/// One simulated world: the robots of a run, their object, the floor.
+///
+/// # What is of which time
+/// After tick k's [`step`](Self::step) the world is at tick k + 1. Positions and velocities are of that
+/// instant. Forces and accelerations belong to the way there: they are those of the last physics step,
+/// unfiltered; where a frame says so, they are averaged over all physics steps of the tick.
+pub struct World {
+    data: MjData<Box<MjModel>>,
+    xml: String,
+    layout: Layout,
+    spring: Option<Spring>,
+    noise: Vec<Option<Noise>>,
+    substeps: u64,
+    /// Readings that are kept for each robot: the delay in ticks, plus one.
+    depth: usize,
+    state: State,
+    scratch: Scratch,
+}
+
+/// What matters from tick to tick besides the simulator's own state.
+struct State {
+    tick: u64,
+    /// The commands of the last tick: where interpolation starts.
+    commands: Box<[JointCommand]>,
+    /// The readings of the last `depth` ticks of each robot, tick k at place k mod `depth`.
+    readings: Box<[Sensors]>,
+    robots: Box<[RobotTruth]>,
+    object: ObjectTruth,
+}
+
+/// Workspace: nothing in it matters after a tick.
+struct Scratch {
+    tallies: Box<[Tally]>,
+    unintended: Unintended,
+    hand_wrenches: Box<[[Wrench<mikoshi_spatial::World>; MAX_HANDS]]>,
+    simulator_state: Box<[f64]>,
+}
+
+/// All that the simulator integrates, warm start included: without it a replay differs in the last bits.
+const INTEGRATION: u32 = MjtState::mjSTATE_INTEGRATION as u32;
+
+impl World {
+    /// The world at tick 0, at rest, with the hands on the object.
+    ///
+    /// # Errors
+    /// A run that no world can be built from; see [`BuildWorldError`].
+    pub fn new(run: &RunSpec) -> Result<Self, BuildWorldError> {
+        logging::install();
+        let scenario = &run.scenario;
+        let substeps = scenario.substeps();
+        let remainder_s = substeps as f64 * scenario.physics.step_s - scenario.control_period_s;
+        if substeps == 0 || remainder_s.abs() > 1e-9 {
+            return Err(BuildWorldError::Inconsistent {
+                place: "[physics]".to_owned(),
+                what: format!(
+                    "step_s = {} does not divide control_period_s = {}",
+                    scenario.physics.step_s, scenario.control_period_s
+                ),
+            });
+        }
+        let robots = run.robots.iter().map(Robot::resolve).collect::<Result<Vec<_>, _>>()?;
+        let grasps = grasp::sites(scenario, &robots);
+        let spring = Spring::of(scenario, grasps.len())?;
+        let xml = mjcf::world(scenario, &robots, &grasps);
+        let simulator = |error: &dyn core::fmt::Display| BuildWorldError::Simulator(error.to_string());
+        let model = MjModel::from_xml_string(&xml).map_err(|error| simulator(&error))?;
+        let layout = Layout::of(&model, &robots, &grasps)?;
+        let noise = layout.robots.iter().enumerate().map(|(index, robot)| {
+            Noise::of(&scenario.sensors, scenario.seed, index, robot, scenario.control_period_s)
+        });
+        let noise = noise.collect();
+        let state_size = model.state_size(INTEGRATION);
+        let mut data = MjData::try_new(Box::new(model)).map_err(|error| simulator(&error))?;
+
+        let mut commands = vec![bytemuck::Zeroable::zeroed(); robots.len()].into_boxed_slice();
+        let postures = run.robots.iter().map(|robot| &robot.initial_posture_rad);
+        for ((layout, posture), command) in layout.robots.iter().zip(postures).zip(&mut commands) {
+            let command: &mut JointCommand = command;
+            for (index, (joint, angle_rad)) in layout.joints.iter().zip(posture).enumerate() {
+                data.qpos_mut()[joint.qpos] = *angle_rad;
+                data.ctrl_mut()[joint.actuator] = *angle_rad;
+                command.joint_position_ref_rad[index] = *angle_rad;
+            }
+        }
+        let depth = scenario.sensors.delay_ticks as usize + 1;
+        let state = State {
+            tick: 0,
+            commands,
+            readings: vec![bytemuck::Zeroable::zeroed(); robots.len() * depth].into(),
+            robots: vec![bytemuck::Zeroable::zeroed(); robots.len()].into(),
+            object: bytemuck::Zeroable::zeroed(),
+        };
+        let scratch = Scratch {
+            tallies: vec![Tally::empty(); robots.len()].into(),
+            unintended: Unintended::default(),
+            hand_wrenches: vec![[Wrench::zero(); MAX_HANDS]; robots.len()].into(),
+            simulator_state: vec![0.0; state_size].into(),
+        };
+        let mut world = Self { data, xml, layout, spring, noise, substeps, depth, state, scratch };
+        world.data.step1();
+        world.pull_by_springs();
+        world.data.forward();
+        world.read_hand_wrenches();
+        world.observe();
+        // Readings from before tick 0 are those of tick 0.
+        for ring in world.state.readings.chunks_exact_mut(depth) {
+            let first = ring[0];
+            ring.fill(first);
+        }
+        Ok(world)
+    }
+
+    /// The world in MuJoCo's language.
+    pub fn xml(&self) -> &str {
+        &self.xml
+    }
+
+    /// Number of robots.
+    pub fn robot_count(&self) -> usize {
+        self.state.robots.len()
+    }
+
+    /// The tick that the world is at.
+    pub fn tick(&self) -> u64 {
+        self.state.tick
+    }
+
+    /// The name of a geom: `ROBOT/LINK#INDEX`, `object` or `floor`.
+    pub fn geom_name(&self, geom: usize) -> Option<&str> {
+        let model = self.data.model();
+        (geom < model.ngeom() as usize).then(|| model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom))?
+    }
+
+    /// What robot `robot`'s sensors say at this tick.
+    pub fn sense(&self, robot: usize, sensors: &mut Sensors) {
+        // Tick k lies at k mod depth; the oldest, `delay` = depth − 1 ticks ago, follows it.
+        let oldest = (self.state.tick as usize + 1) % self.depth;
+        *sensors = self.state.readings[robot * self.depth + oldest];
+    }
+
+    /// Robot `robot` as it truly is.
+    pub fn robot_truth(&self, robot: usize, truth: &mut RobotTruth) {
+        *truth = self.state.robots[robot];
+    }
+
+    /// The object as it truly is.
+    pub fn object_truth(&self, truth: &mut ObjectTruth) {
+        *truth = self.state.object;
+    }
+
+    /// Advances by one tick. References run linearly from the last commands to these, and reach them
+    /// in the last physics step; the rates feed the drives' damping forward.
+    ///
+    /// # Errors
+    /// The result is not physics. The world must not be used any more, except to be loaded.
+    pub fn step(&mut self, commands: &[JointCommand]) -> Result<(), StepWorldError> {
+        if commands.len() != self.robot_count() {
+            return Err(StepWorldError::CommandCount);
+        }
+        self.scratch.tallies.fill(Tally::empty());
+        self.scratch.unintended = Unintended::default();
+        for substep in 1..=self.substeps {
+            self.set_drives(commands, substep as f64 / self.substeps as f64);
+            self.pull_by_springs();
+            for (tally, layout) in self.scratch.tallies.iter_mut().zip(&self.layout.robots) {
+                tally.count_demands(&self.data, layout);
+            }
+            self.data.step2();
+            // Between the halves of a step its forces and contacts stand.
+            for (tally, layout) in self.scratch.tallies.iter_mut().zip(&self.layout.robots) {
+                tally.count_torques(&self.data, layout);
+            }
+            let Scratch { tallies, unintended, .. } = &mut self.scratch;
+            tally::count_contacts(&self.data, &self.layout, tallies, unintended);
+            if substep == self.substeps {
+                self.read_hand_wrenches();
+            }
+            self.data.step1();
+            self.check()?;
+        }
+        self.state.commands.copy_from_slice(commands);
+        self.state.tick += 1;
+        self.observe();
+        Ok(())
+    }
+
+    /// Bytes of a checkpoint.
+    pub fn checkpoint_size(&self) -> usize {
+        let State { tick, commands, readings, robots, object } = &self.state;
+        size_of_val(&*self.scratch.simulator_state)
+            + size_of_val(tick)
+            + size_of_val(&**commands)
+            + size_of_val(&**readings)
+            + size_of_val(&**robots)
+            + size_of_val(object)
+    }
+
+    /// Writes all that matters into the first [`checkpoint_size`](Self::checkpoint_size) bytes.
+    ///
+    /// # Errors
+    /// There are not as many bytes.
+    pub fn save(&mut self, checkpoint: &mut [u8]) -> Result<(), LoadWorldError> {
+        self.check_size(checkpoint)?;
+        self.data.read_state_into(INTEGRATION, &mut self.scratch.simulator_state);
+        let mut rest = checkpoint;
+        for part in self.state.parts(&mut self.scratch.simulator_state) {
+            let (head, tail) = rest.split_at_mut(part.len());
+            head.copy_from_slice(part);
+            rest = tail;
+        }
+        Ok(())
+    }
+
+    /// Returns to a checkpoint of a world of the same run. What follows is the same to the last bit.
+    ///
+    /// # Errors
+    /// There are not as many bytes as a checkpoint of this world has.
+    pub fn load(&mut self, checkpoint: &[u8]) -> Result<(), LoadWorldError> {
+        self.check_size(checkpoint)?;
+        let mut rest = checkpoint;
+        for part in self.state.parts(&mut self.scratch.simulator_state) {
+            let (head, tail) = rest.split_at(part.len());
+            part.copy_from_slice(head);
+            rest = tail;
+        }
+        self.data
+            .set_state(&self.scratch.simulator_state, INTEGRATION)
+            .map_err(|_| LoadWorldError { found: checkpoint.len(), expected: self.checkpoint_size() })?;
+        self.data.step1();
+        Ok(())
+    }
+
+    fn check_size(&self, checkpoint: &[u8]) -> Result<(), LoadWorldError> {
+        let (found, expected) = (checkpoint.len(), self.checkpoint_size());
+        if found == expected { Ok(()) } else { Err(LoadWorldError { found, expected }) }
+    }
+
+    /// The drives' references at `share` of the way from the last commands to these.
+    fn set_drives(&mut self, commands: &[JointCommand], share: f64) {
+        let ctrl = self.data.ctrl_mut();
+        for ((layout, from), to) in self.layout.robots.iter().zip(&self.state.commands).zip(commands) {
+            for (index, joint) in layout.joints.iter().enumerate() {
+                let (start, end) = (from.joint_position_ref_rad[index], to.joint_position_ref_rad[index]);
+                let feed_forward = match joint.kp > 0.0 {
+                    true => joint.kv / joint.kp * to.joint_velocity_ref_rad_s[index],
+                    false => 0.0,
+                };
+                ctrl[joint.actuator] = start + share * (end - start) + feed_forward;
+            }
+        }
+    }
+
+    /// Sets the grasp springs' forces for the step to come.
+    fn pull_by_springs(&mut self) {
+        let Some(spring) = self.spring else { return };
+        let object = self.layout.object.body;
+        self.data.xfrc_applied_mut()[object] = [0.0; 6];
+        for (layout, wrenches) in self.layout.robots.iter().zip(&mut self.scratch.hand_wrenches) {
+            for (hand, wrench) in layout.hands.iter().zip(wrenches) {
+                *wrench = spring.wrench_on_object(&self.data, hand);
+                let palm = Vector3::from(self.data.site_xpos()[hand.palm_site]);
+                // The simulator wants forces at centres of mass.
+                let at_com = |body: usize, wrench: &Wrench<mikoshi_spatial::World>| {
+                    wrench.shifted(&(palm - Vector3::from(self.data.xipos()[body]))).to_array()
+                };
+                let (on_object, on_hand) = (at_com(object, wrench), at_com(hand.palm_body, &-*wrench));
+                let applied = self.data.xfrc_applied_mut();
+                for (sum, component) in applied[object].iter_mut().zip(on_object) {
+                    *sum += component;
+                }
+                applied[hand.palm_body] = on_hand;
+            }
+        }
+    }
+
+    /// Takes the welds' wrenches while the last step's constraint forces stand; springs' are known.
+    fn read_hand_wrenches(&mut self) {
+        if self.spring.is_some() {
+            return;
+        }
+        for (layout, wrenches) in self.layout.robots.iter().zip(&mut self.scratch.hand_wrenches) {
+            for (hand, wrench) in layout.hands.iter().zip(wrenches) {
+                // SAFETY: called between the halves of a step, or after a forward pass.
+                *wrench = unsafe { truth::weld_wrench(&self.data, &self.layout.object, hand) };
+            }
+        }
+    }
+
+    /// Writes truth and readings of this tick.
+    fn observe(&mut self) {
+        let tick = self.state.tick;
+        let place = tick as usize % self.depth;
+        let rings = self.state.readings.chunks_exact_mut(self.depth);
+        let robots = self.layout.robots.iter().zip(&self.scratch.tallies).zip(&self.scratch.hand_wrenches);
+        for ((((layout, tally), wrenches), ring), (truth, noise)) in
+            robots.zip(rings).zip(self.state.robots.iter_mut().zip(&self.noise))
+        {
+            let reading = &mut ring[place];
+            readings::read(&self.data, layout, tally, reading);
+            if let Some(noise) = noise {
+                noise.add(tick, reading);
+            }
+            truth::of_robot(&self.data, layout, tally, wrenches, truth);
+        }
+        truth::of_object(&self.data, &self.layout, &self.scratch.unintended, &mut self.state.object);
+    }
+
+    fn check(&self) -> Result<(), StepWorldError> {
+        let has_warned = |warning: MjtWarning| self.data.warning()[warning as usize].number > 0;
+        if [MjtWarning::mjWARN_BADQPOS, MjtWarning::mjWARN_BADQVEL, MjtWarning::mjWARN_BADQACC]
+            .into_iter()
+            .any(has_warned)
+        {
+            return Err(StepWorldError::Diverged);
+        }
+        if [MjtWarning::mjWARN_CONTACTFULL, MjtWarning::mjWARN_CNSTRFULL].into_iter().any(has_warned) {
+            return Err(StepWorldError::OutOfMemory);
+        }
+        Ok(())
+    }
+}
+
+impl State {
+    /// All parts of a checkpoint as bytes, the simulator's first.
+    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 6] {
+        [
+            bytemuck::cast_slice_mut(simulator),
+            bytemuck::bytes_of_mut(&mut self.tick),
+            bytemuck::cast_slice_mut(&mut self.commands),
+            bytemuck::cast_slice_mut(&mut self.readings),
+            bytemuck::cast_slice_mut(&mut self.robots),
+            bytemuck::bytes_of_mut(&mut self.object),
+        ]
+    }
+}
