@@ -4,15 +4,16 @@
 //! and no robot kinematics; it reads files, and nothing else of the outside.
 //!
 //! ```text
-//! config/scenarios/NAME.toml ─┐ over
-//! config/teams/TEAM.toml ─────┤        ──▶ Scenario ─┐
-//! --set key=value, --seed ────┘ under                ├─▶ RunSpec ──▶ one file that every service reads
-//! config/robots/MODEL.toml, its URDF ──▶ RobotConfig ┘
+//! --set, --seed  ─────────── over ┐
+//! config/scenarios/NAME.toml over ├──▶ Scenario ──┐
+//! config/teams/TEAM.toml ─────────┘               ├──▶ RunSpec: one file that every service reads
+//! config/robots/MODEL.toml, URDF ──▶ LoadedRobot ─┘
 //! ```
 
 mod decode;
 mod document;
 mod error;
+mod grasp;
 mod load;
 mod nearest;
 mod origin;

@@ -1,0 +1,188 @@
+//! Scenarios: periods that divide each other, teams that agree with their models, gains in range.
+
+use super::checks::{Checks, Violation};
+use crate::robot::RobotConfig;
+use crate::scenario::{Grasp, InternalForces, Member, Scenario};
+use mikoshi_ipc_types::MAX_ROBOTS;
+use std::collections::BTreeSet;
+
+/// Ratios of periods count as whole within this.
+const RATIO_TOLERANCE: f64 = 1e-9;
+/// Oldest command that the schedule of a tick can hold.
+const MAX_COORDINATION_DELAY_TICKS: u64 = 16;
+/// Longest delay of a sensor.
+const MAX_SENSOR_DELAY_TICKS: u64 = 1000;
+/// Longest run: a day at 1 kHz.
+const MAX_TICKS: f64 = 86.4e6;
+
+/// `a / b` if that is a whole number of at least 1.
+fn whole_ratio(a: f64, b: f64) -> Option<f64> {
+    let ratio = a / b;
+    let whole = ratio.round();
+    (ratio.is_finite() && whole >= 1.0 && (ratio - whole).abs() <= RATIO_TOLERANCE * whole).then_some(whole)
+}
+
+/// Indices into `config.hands` of the hands with which a member grasps.
+pub(crate) fn grasping_hands(member: &Member, config: &RobotConfig) -> Option<Vec<usize>> {
+    match &member.hands {
+        None => Some((0..config.hands.len()).collect()),
+        Some(names) => {
+            names.iter().map(|name| config.hands.iter().position(|hand| hand.name == *name)).collect()
+        }
+    }
+}
+
+/// Everything wrong with a scenario whose robots, in order, are `configs`.
+pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Violation> {
+    let mut checks = Checks::default();
+    checks.name("name", &scenario.name);
+    times(&mut checks, scenario);
+    checks.positive("object.mass_kg", scenario.object.mass_kg);
+    for axis in 0..3 {
+        checks.positive(format_args!("object.size_m.{axis}"), scenario.object.size_m[axis]);
+        checks.finite(format_args!("object.position_m.{axis}"), scenario.object.position_m[axis]);
+    }
+    checks.finite("object.yaw_deg", scenario.object.yaw_deg);
+    grasp(&mut checks, &scenario.grasp);
+    let arms = team(&mut checks, &scenario.robots, configs);
+    hybrid(&mut checks, scenario, arms);
+    checks.not_negative("physics.friction", scenario.physics.friction);
+    let sensors = &scenario.sensors;
+    checks.not_negative("sensors.force_noise_n", sensors.force_noise_n);
+    checks.not_negative("sensors.moment_noise_nm", sensors.moment_noise_nm);
+    checks.not_negative("sensors.encoder_noise_rad", sensors.encoder_noise_rad);
+    checks.not_negative("sensors.gyro_noise_rad_s", sensors.gyro_noise_rad_s);
+    checks.not_negative("sensors.accelerometer_noise_m_s2", sensors.accelerometer_noise_m_s2);
+    thresholds(&mut checks, scenario);
+    if let Some(priority) = scenario.placement.fifo_priority {
+        checks.require(
+            (1..=99).contains(&priority),
+            "placement.fifo_priority",
+            priority,
+            "a priority from 1 to 99",
+        );
+    }
+    checks.0
+}
+
+fn times(checks: &mut Checks, scenario: &Scenario) {
+    let period = scenario.control_period_s;
+    checks.positive("control_period_s", period);
+    checks.positive("duration_s", scenario.duration_s);
+    if period > 0.0 && scenario.duration_s > 0.0 {
+        let ticks = whole_ratio(scenario.duration_s, period);
+        let expected =
+            format_args!("a whole number of control periods ({period} s), at most {MAX_TICKS:e}").to_string();
+        checks.require(ticks.is_some_and(|n| n <= MAX_TICKS), "duration_s", scenario.duration_s, expected);
+    }
+    let step = scenario.physics.step_s;
+    checks.positive("physics.step_s", step);
+    if period > 0.0 && step > 0.0 {
+        let expected = format!("a whole fraction of control_period_s ({period} s)");
+        checks.require(whole_ratio(period, step).is_some(), "physics.step_s", step, expected);
+    }
+    for (key, ticks, most) in [
+        ("coordination_delay_ticks", scenario.coordination_delay_ticks, MAX_COORDINATION_DELAY_TICKS),
+        ("sensors.delay_ticks", scenario.sensors.delay_ticks, MAX_SENSOR_DELAY_TICKS),
+    ] {
+        checks.require(ticks <= most, key, ticks, format_args!("at most {most} ticks"));
+    }
+}
+
+fn grasp(checks: &mut Checks, grasp: &Grasp) {
+    match grasp {
+        Grasp::Weld { offset_m } => checks.not_negative("grasp.offset_m", *offset_m),
+        Grasp::Spring { offset_m, stiffness_n_m, damping_ns_m, stiffness_nm_rad, damping_nms_rad } => {
+            checks.not_negative("grasp.offset_m", *offset_m);
+            checks.positive("grasp.stiffness_n_m", *stiffness_n_m);
+            checks.not_negative("grasp.damping_ns_m", *damping_ns_m);
+            checks.positive("grasp.stiffness_nm_rad", *stiffness_nm_rad);
+            checks.not_negative("grasp.damping_nms_rad", *damping_nms_rad);
+        }
+    }
+}
+
+/// The number of arms, if every robot's hands are known.
+fn team(checks: &mut Checks, members: &[Member], configs: &[&RobotConfig]) -> Option<usize> {
+    checks.count("robots", members.len(), MAX_ROBOTS, "robots");
+    checks.unique(members.iter().map(|member| member.name.as_str()), |index| format!("robots.{index}.name"));
+    let mut arms = Some(0);
+    for (index, (member, config)) in members.iter().zip(configs).enumerate() {
+        checks.name(format_args!("robots.{index}.name"), &member.name);
+        checks.finite(format_args!("robots.{index}.x_m"), member.x_m);
+        checks.finite(format_args!("robots.{index}.y_m"), member.y_m);
+        checks.finite(format_args!("robots.{index}.yaw_deg"), member.yaw_deg);
+        if let Some(hands) = &member.hands {
+            checks.count(format_args!("robots.{index}.hands"), hands.len(), config.hands.len(), "hands");
+            checks.unique(hands.iter().map(String::as_str), |hand| format!("robots.{index}.hands.{hand}"));
+            let known: Vec<_> = config.hands.iter().map(|hand| hand.name.as_str()).collect();
+            for (place, hand) in hands.iter().enumerate() {
+                let expected = format!("a hand of {}: {}", config.name, known.join(", "));
+                let key = format!("robots.{index}.hands.{place}");
+                checks.require(known.contains(&hand.as_str()), key, format_args!("{hand:?}"), expected);
+            }
+        }
+        arms = arms.zip(grasping_hands(member, config)).map(|(sum, hands)| sum + hands.len());
+    }
+    if let Some(arms) = arms {
+        checks.require(arms >= 2, "robots", format_args!("{arms} arms"), "at least 2 arms in the team");
+    }
+    arms
+}
+
+fn hybrid(checks: &mut Checks, scenario: &Scenario, arms: Option<usize>) {
+    let hybrid = &scenario.hybrid;
+    if let Some(start) = hybrid.start_s {
+        checks.not_negative("hybrid.start_s", start);
+        let expected = format!("a time before the end ({} s); leave it out for never", scenario.duration_s);
+        checks.require(start < scenario.duration_s, "hybrid.start_s", start, expected);
+    }
+    checks.require(hybrid.kz > 0.0 && hybrid.kz <= 1.0, "hybrid.kz", hybrid.kz, "a number above 0, up to 1");
+    checks.positive("hybrid.kh_m_n", hybrid.kh_m_n);
+    checks.positive("hybrid.kh_rad_nm", hybrid.kh_rad_nm);
+    checks.positive("hybrid.filter_hz", hybrid.filter_hz);
+    if let (InternalForces::Matrix(rows), Some(arms)) = (&hybrid.internal_forces, arms) {
+        let key = "hybrid.internal_forces.matrix";
+        let expected = format!("{} rows: one less than the team's {arms} arms", arms.saturating_sub(1));
+        checks.require(rows.len() + 1 == arms, key, format_args!("{} rows", rows.len()), expected);
+        for (index, row) in rows.iter().enumerate() {
+            let expected = format!("one for each of the team's {arms} arms");
+            checks.require(
+                row.len() == arms,
+                format_args!("{key}.{index}"),
+                format_args!("{} numbers", row.len()),
+                expected,
+            );
+            for (column, value) in row.iter().enumerate() {
+                checks.finite(format_args!("{key}.{index}.{column}"), *value);
+            }
+        }
+    }
+    let mut seen = BTreeSet::new();
+    for (index, axis) in hybrid.axes.iter().enumerate() {
+        checks.finite(format_args!("hybrid.axes.{index}.reference"), axis.reference);
+        let found = format!("row {:?}, axis {:?} again", axis.row, axis.axis).to_lowercase();
+        let is_new = seen.insert((&axis.row, axis.axis as u8));
+        checks.require(is_new, format_args!("hybrid.axes.{index}"), found, "each axis of a row once");
+    }
+}
+
+fn thresholds(checks: &mut Checks, scenario: &Scenario) {
+    let limits = &scenario.thresholds;
+    for (key, limit) in [
+        ("internal_start_min_n", limits.internal_start_min_n),
+        ("internal_after_3s_n", limits.internal_after_3s_n),
+        ("internal_after_3s_nm", limits.internal_after_3s_nm),
+        ("internal_end_n", limits.internal_end_n),
+        ("internal_end_nm", limits.internal_end_nm),
+        ("object_position_peak_m", limits.object_position_peak_m),
+        ("object_attitude_peak_rad", limits.object_attitude_peak_rad),
+        ("foot_slip_max_m", limits.foot_slip_max_m),
+        ("joint_margin_min_rad", limits.joint_margin_min_rad),
+        ("zmp_margin_min_m", limits.zmp_margin_min_m),
+    ] {
+        if let Some(limit) = limit {
+            checks.not_negative(format_args!("thresholds.{key}"), limit);
+        }
+    }
+}
