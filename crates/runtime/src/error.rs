@@ -73,6 +73,9 @@ pub enum TickError {
         /// The input or output.
         topic: Topic,
     },
+    /// Shared memory has no room for what the run has mapped.
+    #[error("shared memory is full")]
+    SharedMemoryFull,
     /// A process of the run has died or has failed.
     #[error("{0} is gone")]
     PeerLost(ServiceId),
@@ -106,6 +109,7 @@ pub enum FaultCode {
     NotFinite,
     PublisherFull,
     TransportFailed,
+    SharedMemoryFull,
     PeerLost,
     SupervisorLost,
     Stopped,
@@ -115,7 +119,7 @@ pub enum FaultCode {
 }
 
 impl FaultCode {
-    const ALL: [(Self, &'static str); 14] = [
+    const ALL: [(Self, &'static str); 15] = [
         (Self::InputMissing, "input-missing"),
         (Self::WrongSchema, "wrong-schema"),
         (Self::WrongRobot, "wrong-robot"),
@@ -124,6 +128,7 @@ impl FaultCode {
         (Self::NotFinite, "not-finite"),
         (Self::PublisherFull, "publisher-full"),
         (Self::TransportFailed, "transport-failed"),
+        (Self::SharedMemoryFull, "shared-memory-full"),
         (Self::PeerLost, "peer-lost"),
         (Self::SupervisorLost, "supervisor-lost"),
         (Self::Stopped, "stopped"),
@@ -157,6 +162,7 @@ impl TickError {
             Self::NotFinite { .. } => FaultCode::NotFinite,
             Self::PublisherFull { .. } => FaultCode::PublisherFull,
             Self::TransportFailed { .. } => FaultCode::TransportFailed,
+            Self::SharedMemoryFull => FaultCode::SharedMemoryFull,
             Self::PeerLost(_) => FaultCode::PeerLost,
             Self::SupervisorLost => FaultCode::SupervisorLost,
             Self::Stopped => FaultCode::Stopped,

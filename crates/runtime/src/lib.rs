@@ -10,15 +10,29 @@
 //! - **lockstep**: every service waits for its inputs, however long they take; nothing reads a clock.
 //! - **topic**: one payload about one robot, published once a tick.
 
+mod board;
+mod domain;
 mod error;
+mod member;
+mod process;
+mod run_directory;
 mod runner;
 mod schedule;
+mod shared_memory;
 mod topic;
 pub mod transport;
+mod wait;
 
+pub use board::{Board, BoardError, Role, SlotStatus, State};
+pub use domain::{Domain, DomainError};
 pub use error::{FaultCode, TickError};
-pub use runner::{Participant, RunFault, run_in_one_thread};
+pub use member::{JoinError, Member, TAP_LEAD_TICKS};
+pub use process::ProcessIdentity;
+pub use run_directory::{FoundRun, RunDirectory, RunDirectoryError};
+pub use runner::{Participant, RunFault, Session, run_in_one_thread, run_service};
 pub use schedule::{Call, Input, MAX_AGE_TICKS, Output, Phase, Placement, ScheduleError, TickSchedule};
 pub use topic::Topic;
+pub use transport::iceoryx::{IceoryxTap, IceoryxTransport, OpenError, required_bytes};
 pub use transport::memory::{InMemoryHub, InMemoryTap, InMemoryTransport};
-pub use transport::{ConnectError, Loan, Observer, Publisher, Subscriber, Tap, Transport};
+pub use transport::{ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport};
+pub use wait::WaitPolicy;

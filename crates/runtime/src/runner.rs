@@ -36,6 +36,27 @@ impl<T: Participant + ?Sized> Participant for Box<T> {
     }
 }
 
+/// What surrounds the ticks of a service that has a process of its own.
+pub trait Session {
+    /// Meets all others before the first tick.
+    ///
+    /// # Errors
+    /// A process is lost, the run is to stop, or shared memory is full.
+    fn start(&self) -> Result<(), TickError>;
+
+    /// Enters a tick.
+    ///
+    /// # Errors
+    /// A process is lost, or the run is to stop.
+    fn begin_tick(&self, tick: u64) -> Result<(), TickError>;
+
+    /// Meets all others after the last tick, or tells them why there will be no more.
+    ///
+    /// # Errors
+    /// The outcome's own; a process that was lost after the last tick.
+    fn finish(&self, ticks: u64, outcome: Result<(), TickError>) -> Result<(), TickError>;
+}
+
 /// What ended a run early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{service}, tick {tick}: {error}")]
@@ -80,5 +101,36 @@ pub fn run_in_one_thread<P: Participant>(
             return Ok(tick + 1);
         }
     }
+    Ok(ticks)
+}
+
+/// Runs one service of a schedule in this process.
+///
+/// Returns the number of ticks that were executed: `ticks`.
+///
+/// # Errors
+/// The first fault, of the service or of the session.
+pub fn run_service<P: Participant>(
+    schedule: &TickSchedule,
+    participant: &mut P,
+    session: &impl Session,
+    ticks: u64,
+) -> Result<u64, RunFault> {
+    let service = participant.id();
+    let calls: Vec<Call> = schedule.phases_of(service).map(|phase| phase.call).collect();
+    let mut tick = 0;
+    let mut run = || {
+        session.start()?;
+        while tick < ticks {
+            session.begin_tick(tick)?;
+            for &call in &calls {
+                participant.execute(call, tick)?;
+            }
+            tick += 1;
+        }
+        Ok(())
+    };
+    let outcome = run();
+    session.finish(ticks, outcome).map_err(|error| RunFault { service, tick, error })?;
     Ok(ticks)
 }

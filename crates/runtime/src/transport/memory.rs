@@ -4,18 +4,15 @@
 //! never come. Set-up allocates; loaning, sending and receiving do not.
 
 use super::accept::{Verdict, judge};
-use super::{ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport};
-use crate::schedule::MAX_AGE_TICKS;
+use super::{
+    ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport, consumer_depth,
+};
 use crate::{TickError, TickSchedule, Topic};
 use core::any::Any;
 use core::cell::RefCell;
 use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
 use std::collections::BTreeMap;
 use std::rc::Rc;
-
-/// Frames that a consumer may leave unread: one of each tick up to the oldest that can be scheduled,
-/// and one by a publisher that repeats itself.
-const CONSUMER_DEPTH: usize = MAX_AGE_TICKS as usize + 2;
 
 /// In one thread nobody is replaced, so there is one epoch.
 const EPOCH: u64 = 1;
@@ -133,7 +130,8 @@ impl Transport for InMemoryTransport {
         if self.hub.shared.schedule.input_of(service, topic).is_none() {
             return Err(ConnectError::NotAnInput { service, topic });
         }
-        Ok(InMemorySubscriber { topic, queue: self.hub.queue(topic, CONSUMER_DEPTH) })
+        let depth = consumer_depth(&self.hub.shared.schedule, topic);
+        Ok(InMemorySubscriber { topic, queue: self.hub.queue(topic, depth) })
     }
 }
 
@@ -159,7 +157,7 @@ impl Tap for InMemoryTap {
 pub struct InMemoryPublisher<P: Payload> {
     topic: Topic,
     channel: Rc<Channel<P>>,
-    frame: Frame<P>,
+    pub(super) frame: Frame<P>,
 }
 
 impl<P: Payload> Publisher<P> for InMemoryPublisher<P> {
@@ -180,7 +178,7 @@ impl<P: Payload> Publisher<P> for InMemoryPublisher<P> {
 
 /// A frame that is being filled.
 pub struct InMemoryLoan<'a, P: Payload> {
-    publisher: &'a mut InMemoryPublisher<P>,
+    pub(super) publisher: &'a mut InMemoryPublisher<P>,
 }
 
 impl<P: Payload> Loan<P> for InMemoryLoan<'_, P> {

@@ -1,4 +1,4 @@
-//! How frames travel: one contract, [in memory](memory) in one thread and over iceoryx2
+//! How frames travel: one contract, [in memory](memory) in one thread and over [iceoryx2](iceoryx)
 //! between processes.
 //!
 //! A service can subscribe to its inputs only. Ground truth is for observers, and this does not
@@ -25,13 +25,23 @@
 //! ```
 
 mod accept;
+#[cfg(test)]
+mod conformance;
+pub mod iceoryx;
 pub mod memory;
 
-use crate::{TickError, Topic};
+use crate::{TickError, TickSchedule, Topic};
 use mikoshi_ipc_types::{Frame, Payload, ServiceId, ServicePayload};
 
 /// Ticks that an observer may fall behind before it loses frames.
 pub const OBSERVER_DEPTH: usize = 64;
+
+/// Frames that a consumer's queue holds: one of each tick up to the age that it uses, the next, and two
+/// by a successor that repeats what its predecessor may have said.
+fn consumer_depth(schedule: &TickSchedule, topic: Topic) -> usize {
+    let oldest = schedule.consumers_of(topic).map(|(_, input)| input.age_ticks).max().unwrap_or(0);
+    oldest as usize + 4
+}
 
 /// The ports of one service.
 pub trait Transport {
@@ -135,5 +145,13 @@ pub enum ConnectError {
     NotPublished {
         /// What.
         topic: Topic,
+    },
+    /// The transport has no room for it, or another build publishes another layout under this name.
+    #[error("{topic} can't be connected: {reason}")]
+    Failed {
+        /// What.
+        topic: Topic,
+        /// What the transport says.
+        reason: String,
     },
 }

@@ -1,0 +1,496 @@
+//! The board of a run: a page of shared memory on which every process of the run says who it is, where
+//! it stands and what it sleeps for.
+//!
+//! It is what `mikoshi status` reads, where services meet before the first tick and after the last, and
+//! where one that waits learns that another has died.
+
+use crate::process::ProcessIdentity;
+use crate::wait::Bed;
+use crate::{FaultCode, TickError};
+use core::fmt;
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use memmap2::MmapRaw;
+use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId};
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+/// Who has a slot on the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Role {
+    /// Who started the run, and ends it.
+    Supervisor,
+    /// The one observer that is connected from the first tick; all other observers attach to it.
+    Tap,
+    /// A service.
+    Service(ServiceId),
+}
+
+impl Role {
+    const FIRST_SERVO: u64 = 16;
+
+    fn to_wire(self) -> u64 {
+        match self {
+            Self::Supervisor => 1,
+            Self::Tap => 2,
+            Self::Service(ServiceId::Bridge) => 3,
+            Self::Service(ServiceId::Coordinator) => 4,
+            Self::Service(ServiceId::Servo(robot)) => Self::FIRST_SERVO + robot as u64,
+        }
+    }
+
+    fn from_wire(code: u64) -> Option<Self> {
+        match code {
+            1 => Some(Self::Supervisor),
+            2 => Some(Self::Tap),
+            3 => Some(Self::Service(ServiceId::Bridge)),
+            4 => Some(Self::Service(ServiceId::Coordinator)),
+            _ => code
+                .checked_sub(Self::FIRST_SERVO)
+                .filter(|robot| *robot < MAX_ROBOTS as u64)
+                .map(|robot| Self::Service(ServiceId::Servo(robot as usize))),
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Supervisor => f.pad("supervisor"),
+            Self::Tap => f.pad("tap"),
+            Self::Service(service) => f.pad(&service.to_string()),
+        }
+    }
+}
+
+/// How far a process of the run has come.
+///
+/// ```text
+/// Absent → Starting → Wired → Ready → Running → Done
+///             └─────────┴───────┴────────┴────→ Failed
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum State {
+    /// Nobody has this slot.
+    Absent = 0,
+    /// It sets itself up.
+    Starting,
+    /// All its ports exist.
+    Wired,
+    /// Its ports are connected to those of all others.
+    Ready,
+    /// It executes ticks.
+    Running,
+    /// It has executed all of them.
+    Done,
+    /// It ended early.
+    Failed,
+}
+
+impl State {
+    fn from_wire(code: u32) -> Self {
+        match code {
+            0 => Self::Absent,
+            1 => Self::Starting,
+            2 => Self::Wired,
+            3 => Self::Ready,
+            4 => Self::Running,
+            5 => Self::Done,
+            // A board is written by our processes only; whatever else it says, it is not well.
+            _ => Self::Failed,
+        }
+    }
+
+    /// Whether the process has nothing more to say.
+    pub fn has_ended(self) -> bool {
+        matches!(self, Self::Done | Self::Failed)
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Absent => "absent",
+            Self::Starting => "starting",
+            Self::Wired => "wired",
+            Self::Ready => "ready",
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Failed => "failed",
+        })
+    }
+}
+
+/// What a slot says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlotStatus {
+    /// Whose it is.
+    pub role: Role,
+    /// The process that has it, or had it last.
+    pub process: Option<ProcessIdentity>,
+    /// Whether that process still runs.
+    pub alive: bool,
+    /// Its incarnation: 1 for the first.
+    pub epoch: u64,
+    /// How far it has come.
+    pub state: State,
+    /// The tick that it executes; for the tap, the number of ticks that it has consumed.
+    pub tick: u64,
+    /// Why it failed.
+    pub fault: Option<(FaultCode, String)>,
+}
+
+/// Words of text in which a process says why it failed.
+const MESSAGE_WORDS: usize = 24;
+
+/// What one process says. The first line changes seldom, the second each tick and is written by its
+/// owner only, the bed is written when it sleeps: three cache lines that don't disturb one another.
+#[repr(C, align(64))]
+pub(crate) struct Slot {
+    role: AtomicU64,
+    start_time: AtomicU64,
+    pub(crate) epoch: AtomicU64,
+    pid: AtomicU32,
+    state: AtomicU32,
+    fault: AtomicU32,
+    message_length: AtomicU32,
+    progress: Progress,
+    pub(crate) bed: Bed,
+    message: [AtomicU64; MESSAGE_WORDS],
+}
+
+#[repr(C, align(64))]
+struct Progress {
+    tick: AtomicU64,
+}
+
+impl Slot {
+    pub(crate) fn role(&self) -> Option<Role> {
+        Role::from_wire(self.role.load(Ordering::Relaxed))
+    }
+
+    pub(crate) fn state(&self) -> State {
+        State::from_wire(self.state.load(Ordering::Acquire))
+    }
+
+    pub(crate) fn set_state(&self, state: State) {
+        self.state.store(state as u32, Ordering::Release);
+    }
+
+    pub(crate) fn tick(&self) -> u64 {
+        self.progress.tick.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn set_tick(&self, tick: u64) {
+        self.progress.tick.store(tick, Ordering::Release);
+    }
+
+    pub(crate) fn process(&self) -> Option<ProcessIdentity> {
+        let pid = self.pid.load(Ordering::Acquire);
+        (pid != 0).then(|| ProcessIdentity { pid, start_time: self.start_time.load(Ordering::Acquire) })
+    }
+
+    /// Gives the slot to a process, unless a living one has it.
+    pub(crate) fn claim(&self, process: ProcessIdentity) -> Result<(), ProcessIdentity> {
+        if let Some(owner) = self.process().filter(|owner| !self.state().has_ended() && owner.is_alive()) {
+            return Err(owner);
+        }
+        self.start_time.store(process.start_time, Ordering::Release);
+        self.pid.store(process.pid, Ordering::Release);
+        self.epoch.fetch_add(1, Ordering::AcqRel);
+        self.set_state(State::Starting);
+        Ok(())
+    }
+
+    pub(crate) fn set_fault(&self, error: &TickError) {
+        let text = error.to_string();
+        let text = text.as_bytes();
+        let length = text.len().min(8 * MESSAGE_WORDS);
+        for (word, bytes) in self.message.iter().zip(text[..length].chunks(8)) {
+            let mut padded = [0; 8];
+            padded[..bytes.len()].copy_from_slice(bytes);
+            word.store(u64::from_le_bytes(padded), Ordering::Relaxed);
+        }
+        self.message_length.store(length as u32, Ordering::Relaxed);
+        self.fault.store(error.code() as u32, Ordering::Release);
+    }
+
+    pub(crate) fn fault_code(&self) -> Option<FaultCode> {
+        FaultCode::from_number(self.fault.load(Ordering::Acquire))
+    }
+
+    fn fault(&self) -> Option<(FaultCode, String)> {
+        let code = self.fault_code()?;
+        let bytes: Vec<u8> =
+            self.message.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()).collect();
+        let length = (self.message_length.load(Ordering::Relaxed) as usize).min(bytes.len());
+        Some((code, String::from_utf8_lossy(&bytes[..length]).into_owned()))
+    }
+
+    fn status(&self) -> Option<SlotStatus> {
+        let process = self.process();
+        Some(SlotStatus {
+            role: self.role()?,
+            process,
+            alive: process.is_some_and(|process| process.is_alive()),
+            epoch: self.epoch.load(Ordering::Acquire),
+            state: self.state(),
+            tick: self.tick(),
+            fault: self.fault(),
+        })
+    }
+}
+
+#[repr(C, align(64))]
+struct Header {
+    magic: AtomicU64,
+    slots: AtomicU64,
+    /// Set when the run is to end early: by request, or since a process failed.
+    alarm: AtomicU32,
+    stop: AtomicU32,
+}
+
+/// Names the layout too: another one gets another number.
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi1");
+const FILE: &str = "board";
+
+/// Why there is no board.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardError {
+    /// Its file can't be made or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is something else.
+    #[error("{}: not the board of a run of this version", path.display())]
+    NotABoard {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// The mapped board. All that is shared is atomic.
+pub struct Board {
+    map: MmapRaw,
+    slots: usize,
+}
+
+impl Board {
+    /// Makes the board of a run in its directory. If a tap is expected, the first tick waits for it.
+    ///
+    /// # Errors
+    /// The file can't be made: no space, no rights, or there is one.
+    pub fn create(directory: &Path, services: &[ServiceId], expects_tap: bool) -> Result<Self, BoardError> {
+        let path = directory.join(FILE);
+        let io_error = |source| BoardError::Io { path: path.clone(), source };
+        let roles: Vec<_> = [Role::Supervisor, Role::Tap]
+            .into_iter()
+            .chain(services.iter().copied().map(Role::Service))
+            .collect();
+        let size = size_of::<Header>() + roles.len() * size_of::<Slot>();
+        // It gets its name once it is complete, so that nobody opens half of it.
+        let unfinished = directory.join("board.unfinished");
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&unfinished)
+            .map_err(io_error)?;
+        // Allocated, not only sized: a page that shared memory has no room for would fault later.
+        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size as u64)
+            .map_err(|errno| io_error(errno.into()))?;
+        let board = Self { map: map(&file, size).map_err(io_error)?, slots: roles.len() };
+        for (slot, role) in board.slots().iter().zip(&roles) {
+            slot.role.store(role.to_wire(), Ordering::Relaxed);
+            if *role == Role::Tap && expects_tap {
+                slot.set_state(State::Starting);
+            }
+        }
+        board.header().slots.store(roles.len() as u64, Ordering::Relaxed);
+        board.header().magic.store(MAGIC, Ordering::Release);
+        std::fs::rename(&unfinished, &path).map_err(io_error)?;
+        Ok(board)
+    }
+
+    /// Opens the board of a run.
+    ///
+    /// # Errors
+    /// There is none, or it is of another version.
+    pub fn open(directory: &Path) -> Result<Self, BoardError> {
+        let path = directory.join(FILE);
+        let io_error = |source| BoardError::Io { path: path.clone(), source };
+        let file = OpenOptions::new().read(true).write(true).open(&path).map_err(io_error)?;
+        let size = file.metadata().map_err(io_error)?.len() as usize;
+        if size < size_of::<Header>() {
+            return Err(BoardError::NotABoard { path });
+        }
+        let mut board = Self { map: map(&file, size).map_err(io_error)?, slots: 0 };
+        let slots = board.header().slots.load(Ordering::Relaxed);
+        let expected =
+            slots.saturating_mul(size_of::<Slot>() as u64).saturating_add(size_of::<Header>() as u64);
+        if board.header().magic.load(Ordering::Acquire) != MAGIC || expected != size as u64 {
+            return Err(BoardError::NotABoard { path });
+        }
+        board.slots = slots as usize;
+        Ok(board)
+    }
+
+    /// What all slots say, in order.
+    pub fn statuses(&self) -> Vec<SlotStatus> {
+        self.slots().iter().filter_map(Slot::status).collect()
+    }
+
+    /// Whether any process of the run still runs.
+    pub fn has_living_process(&self) -> bool {
+        self.slots().iter().filter_map(Slot::process).any(|process| process.is_alive())
+    }
+
+    /// Asks all services to end. Their waits end within a moment.
+    pub fn request_stop(&self) {
+        self.header().stop.store(1, Ordering::Release);
+        self.raise_alarm();
+    }
+
+    pub(crate) fn stop_is_requested(&self) -> bool {
+        self.header().stop.load(Ordering::Acquire) != 0
+    }
+
+    /// Makes every wait look around.
+    pub(crate) fn raise_alarm(&self) {
+        self.header().alarm.store(1, Ordering::Release);
+        self.wake_all();
+    }
+
+    pub(crate) fn alarm_is_raised(&self) -> bool {
+        self.header().alarm.load(Ordering::Acquire) != 0
+    }
+
+    pub(crate) fn wake_all(&self) {
+        for slot in self.slots() {
+            slot.bed.wake_anyway();
+        }
+    }
+
+    pub(crate) fn index_of(&self, role: Role) -> Option<usize> {
+        self.slots().iter().position(|slot| slot.role() == Some(role))
+    }
+
+    fn header(&self) -> &Header {
+        // SAFETY: the mapping is at least as large as a header (checked when it was made), aligned to a
+        // page, lives as long as `self`, and a header consists of atomics only, so that other
+        // processes may write to it at any time. That nobody truncates the file is given by the run's
+        // directory, which only its owner may enter.
+        unsafe { &*self.map.as_ptr().cast::<Header>() }
+    }
+
+    pub(crate) fn slots(&self) -> &[Slot] {
+        // SAFETY: as for the header; size and alignment were checked when the mapping was made: the
+        // header's size is a multiple of the slot's alignment.
+        unsafe {
+            let first = self.map.as_ptr().add(size_of::<Header>()).cast::<Slot>();
+            core::slice::from_raw_parts(first, self.slots)
+        }
+    }
+}
+
+const _: () = assert!(size_of::<Header>().is_multiple_of(align_of::<Slot>()));
+
+fn map(file: &File, size: usize) -> io::Result<MmapRaw> {
+    memmap2::MmapOptions::new().len(size).populate().map_raw(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn services() -> Vec<ServiceId> {
+        ServiceId::of_team(2).collect()
+    }
+
+    fn own() -> ProcessIdentity {
+        ProcessIdentity::own().expect("/proc is there")
+    }
+
+    #[test]
+    fn what_one_process_writes_another_reads() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let ours = Board::create(directory.path(), &services(), false).expect("a board");
+        let theirs = Board::open(directory.path()).expect("the same board");
+        assert_eq!(theirs.statuses().len(), 2 + 4);
+
+        let index = ours.index_of(Role::Service(ServiceId::Servo(1))).expect("a slot");
+        let slot = &ours.slots()[index];
+        slot.claim(own()).expect("it is free");
+        slot.set_tick(7);
+        slot.set_fault(&TickError::PeerLost(ServiceId::Bridge));
+        slot.set_state(State::Failed);
+        let status = &theirs.statuses()[index];
+        assert_eq!(status.role, Role::Service(ServiceId::Servo(1)));
+        assert_eq!((status.process, status.alive), (Some(own()), true));
+        assert_eq!((status.epoch, status.state, status.tick), (1, State::Failed, 7));
+        assert_eq!(status.fault, Some((FaultCode::PeerLost, "bridge is gone".into())));
+    }
+
+    #[test]
+    fn a_slot_belongs_to_one_living_process() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let board = Board::create(directory.path(), &services(), false).expect("a board");
+        let slot = &board.slots()[2];
+        slot.claim(own()).expect("it is free");
+        assert_eq!(slot.claim(own()), Err(own()));
+
+        // Its owner has died: a successor gets it, with the next epoch.
+        slot.start_time.store(own().start_time + 1, Ordering::Relaxed);
+        slot.claim(own()).expect("its owner is gone");
+        assert_eq!(slot.epoch.load(Ordering::Relaxed), 2);
+    }
+
+    #[test]
+    fn a_file_that_is_no_board_is_rejected() {
+        let directory = tempfile::tempdir().expect("a directory");
+        assert!(matches!(Board::open(directory.path()), Err(BoardError::Io { .. })));
+        for content in [vec![], vec![0; size_of::<Header>()], vec![0xff; 4096]] {
+            std::fs::write(directory.path().join(FILE), content).expect("it can be written");
+            assert!(matches!(Board::open(directory.path()), Err(BoardError::NotABoard { .. })));
+        }
+    }
+
+    #[test]
+    fn a_run_has_one_board() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let board = Board::create(directory.path(), &services(), false).expect("a board");
+        assert!(!board.has_living_process());
+        std::fs::write(directory.path().join("board.unfinished"), "").expect("it can be written");
+        assert!(matches!(Board::create(directory.path(), &services(), false), Err(BoardError::Io { .. })));
+    }
+
+    #[test]
+    fn roles_survive_the_wire() {
+        let roles = [Role::Supervisor, Role::Tap].into_iter();
+        for role in roles.chain(ServiceId::of_team(MAX_ROBOTS).map(Role::Service)) {
+            assert_eq!(Role::from_wire(role.to_wire()), Some(role));
+        }
+        for code in [0, 5, Role::FIRST_SERVO + MAX_ROBOTS as u64, u64::MAX] {
+            assert_eq!(Role::from_wire(code), None);
+        }
+    }
+
+    #[test]
+    fn long_faults_are_cut() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let board = Board::create(directory.path(), &services(), false).expect("a board");
+        const LONG: &str = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef\
+            0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef\
+            0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
+        board.slots()[0].set_fault(&TickError::Service(LONG));
+        let (_, text) = board.slots()[0].fault().expect("a fault");
+        assert_eq!(text, LONG[..8 * MESSAGE_WORDS]);
+    }
+}

@@ -1,0 +1,213 @@
+//! A process's place on the board: it waits there for others, and is woken there.
+
+use crate::board::{Board, BoardError, Role, Slot, State};
+use crate::process::{ProcessIdentity, ProcessWatch};
+use crate::wait::{Reason, WaitPolicy, Woken};
+use crate::{FaultCode, TickError};
+use core::cell::RefCell;
+use mikoshi_ipc_types::ServiceId;
+use std::io;
+use std::path::Path;
+
+/// Ticks that the run may be ahead of a tap that records without loss: half of what its queues hold.
+pub const TAP_LEAD_TICKS: u64 = crate::transport::OBSERVER_DEPTH as u64 / 2;
+
+/// Why a process can't take its place.
+#[derive(Debug, thiserror::Error)]
+pub enum JoinError {
+    /// There is no board.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The run has no such role.
+    #[error("this run has no {0}")]
+    NoSuchRole(Role),
+    /// A living process has it.
+    #[error("{role} is process {owner} already")]
+    Occupied {
+        /// The role.
+        role: Role,
+        /// Who has it.
+        owner: ProcessIdentity,
+    },
+    /// `/proc` is not to be read.
+    #[error("/proc: {0}")]
+    Proc(#[from] io::Error),
+}
+
+/// A process of a run. When it is dropped before [`Member::conclude`], all others learn that it failed.
+pub struct Member {
+    board: Board,
+    role: Role,
+    slot: usize,
+    policy: WaitPolicy,
+    /// By slot; renewed when a successor takes the slot.
+    watches: RefCell<Vec<Option<ProcessWatch>>>,
+}
+
+impl Member {
+    /// Takes this role in the run of this directory, with the next epoch.
+    ///
+    /// # Errors
+    /// There is no board, no such role, or a living process has it.
+    pub fn join(run: &Path, role: Role, policy: WaitPolicy) -> Result<Self, JoinError> {
+        let board = Board::open(run)?;
+        let slot = board.index_of(role).ok_or(JoinError::NoSuchRole(role))?;
+        board.slots()[slot]
+            .claim(ProcessIdentity::own()?)
+            .map_err(|owner| JoinError::Occupied { role, owner })?;
+        let watches = RefCell::new(board.slots().iter().map(|_| None).collect());
+        Ok(Self { board, role, slot, policy, watches })
+    }
+
+    /// The board.
+    pub fn board(&self) -> &Board {
+        &self.board
+    }
+
+    /// Its role.
+    pub fn role(&self) -> Role {
+        self.role
+    }
+
+    /// Its incarnation: 1 for the first process in this role.
+    pub fn epoch(&self) -> u64 {
+        self.slot().epoch.load(core::sync::atomic::Ordering::Acquire)
+    }
+
+    /// Says that it has ended as it should.
+    pub fn conclude(&self) {
+        self.enter(State::Done);
+    }
+
+    /// Says why it ends early, and ends the waits of all others.
+    pub fn fail(&self, error: &TickError) {
+        self.slot().set_fault(error);
+        self.enter(State::Failed);
+        // What becomes of the tap is nobody's concern.
+        if self.role != Role::Tap {
+            self.board.raise_alarm();
+        }
+    }
+
+    pub(crate) fn slot(&self) -> &Slot {
+        &self.board.slots()[self.slot]
+    }
+
+    pub(crate) fn slot_of(&self, role: Role) -> Option<&Slot> {
+        self.board.index_of(role).map(|index| &self.board.slots()[index])
+    }
+
+    pub(crate) fn enter(&self, state: State) {
+        self.slot().set_state(state);
+        self.board.wake_all();
+    }
+
+    pub(crate) fn begin_tick(&self, tick: u64) -> Result<(), TickError> {
+        self.slot().set_tick(tick);
+        if self.board.alarm_is_raised() { self.look_around() } else { Ok(()) }
+    }
+
+    /// Enters a state and waits until all services, and the tap if there is one, have come as far.
+    pub(crate) fn meet(&self, state: State) -> Result<(), TickError> {
+        self.enter(state);
+        self.wait_for(Reason::STATE, || {
+            let all_met = self.board.slots().iter().all(|slot| match (slot.role(), slot.state()) {
+                (Some(Role::Service(_)), State::Failed) => false,
+                (Some(Role::Service(_)), other) => other >= state,
+                (Some(Role::Tap), other) => other == State::Absent || other >= state,
+                _ => true,
+            });
+            Ok(all_met.then_some(()))
+        })
+    }
+
+    /// Waits while the tap is attached and has consumed less than this many ticks.
+    pub(crate) fn wait_for_tap(&self, ticks: u64) -> Result<(), TickError> {
+        let Some(tap) = self.slot_of(Role::Tap) else { return Ok(()) };
+        self.wait_for(Reason::CREDIT, || {
+            let attached = (State::Starting..=State::Running).contains(&tap.state());
+            Ok((!attached || tap.tick() >= ticks).then_some(()))
+        })
+    }
+
+    /// Polls until it returns something, and sleeps in between.
+    ///
+    /// # Errors
+    /// Those of `poll`; a service or the supervisor is gone; the run is to stop.
+    pub(crate) fn wait_for<T>(
+        &self,
+        reason: Reason,
+        poll: impl FnMut() -> Result<Option<T>, TickError>,
+    ) -> Result<T, TickError> {
+        self.slot().bed.wait(reason, self.policy, poll, |woken| {
+            if woken == Woken::TimedOut || self.board.alarm_is_raised() { self.look_around() } else { Ok(()) }
+        })
+    }
+
+    /// Whether all services have said that they have ended.
+    pub(crate) fn all_services_have_ended(&self) -> bool {
+        self.board.slots().iter().all(|slot| match slot.role() {
+            Some(Role::Service(_)) => slot.state().has_ended(),
+            _ => true,
+        })
+    }
+
+    /// Looks whether the run goes on. A death that nobody announced is named first: it is the cause of
+    /// what others announce.
+    fn look_around(&self) -> Result<(), TickError> {
+        let mut failed: Option<(bool, ServiceId)> = None;
+        let mut supervisor_is_lost = false;
+        for (index, slot) in self.board.slots().iter().enumerate() {
+            if index == self.slot {
+                continue;
+            }
+            // Whether it has exited is asked before its state: one that is done says so before it exits.
+            let has_exited = self.has_exited(index);
+            match (slot.role(), slot.state()) {
+                (_, State::Absent | State::Done) | (None, _) => {}
+                (Some(Role::Service(service)), State::Failed) => {
+                    let is_consequence = slot.fault_code() == Some(FaultCode::PeerLost);
+                    failed = failed.into_iter().chain([(is_consequence, service)]).min();
+                }
+                (Some(Role::Service(service)), _) if has_exited => return Err(TickError::PeerLost(service)),
+                (Some(Role::Supervisor), state) => supervisor_is_lost = has_exited || state == State::Failed,
+                (Some(Role::Tap), state) if has_exited && state < State::Done => {
+                    slot.set_state(State::Failed)
+                }
+                _ => {}
+            }
+        }
+        match failed {
+            _ if supervisor_is_lost => Err(TickError::SupervisorLost),
+            _ if self.board.stop_is_requested() => Err(TickError::Stopped),
+            Some((_, service)) => Err(TickError::PeerLost(service)),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a process had this slot and is gone.
+    fn has_exited(&self, index: usize) -> bool {
+        let Some(process) = self.board.slots()[index].process() else { return false };
+        let mut watches = self.watches.borrow_mut();
+        let watch = &mut watches[index];
+        if watch.as_ref().map(ProcessWatch::identity) != Some(process) {
+            *watch = Some(ProcessWatch::new(process));
+        }
+        watch.as_ref().is_some_and(ProcessWatch::has_exited)
+    }
+
+    /// Opens what is needed to see others die, so that no wait has to.
+    pub(crate) fn watch_all(&self) {
+        for index in 0..self.board.slots().len() {
+            self.has_exited(index);
+        }
+    }
+}
+
+impl Drop for Member {
+    fn drop(&mut self) {
+        if !self.slot().state().has_ended() {
+            self.fail(&TickError::Aborted);
+        }
+    }
+}

@@ -1,0 +1,492 @@
+//! Frames over iceoryx2, between the processes of a run.
+//!
+//! Data travels in iceoryx2's shared memory; waiting and waking happen on the run's board, since a
+//! publisher that finds nobody asleep then makes no system call.
+
+use super::accept::{Verdict, judge};
+use super::{
+    ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport, consumer_depth,
+};
+use crate::board::{Role, State};
+use crate::member::{Member, TAP_LEAD_TICKS};
+use crate::shared_memory::populate;
+use crate::wait::Reason;
+use crate::{Domain, DomainError, Session, TickError, TickSchedule, Topic};
+use core::cell::{Cell, RefCell};
+use core::mem::MaybeUninit;
+use core::sync::atomic::Ordering;
+use iceoryx2::port::LoanError;
+use iceoryx2::port::publisher::Publisher as IceoryxPort;
+use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriberPort;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{LogLevel, Node, NodeBuilder, SignalHandlingMode, ipc, set_log_level};
+use iceoryx2::sample_mut::SampleMut;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
+use rustix::time::{ClockId, clock_gettime};
+use std::path::Path;
+use std::rc::Rc;
+
+/// Processes that may publish a topic at a time: the one in charge, a standby, and a predecessor that
+/// is frozen and still holds its place.
+const MAX_PUBLISHERS: usize = 3;
+/// Processes that may wait for a topic at a time, for the same reasons. By the schedule a topic has at
+/// most one service that waits for it.
+const MAX_CONSUMERS: usize = 3;
+/// The tap, and its successor if it is frozen.
+const MAX_TAPS: usize = 2;
+/// Whoever has a port, and somebody who looks.
+const MAX_NODES: usize = MAX_PUBLISHERS + MAX_CONSUMERS + MAX_TAPS + 2;
+/// Frames are copied out of shared memory at once.
+const MAX_BORROWED: usize = 1;
+/// A frame is filled and sent before the next is loaned.
+const MAX_LOANED: usize = 1;
+
+/// Frames that one publisher needs room for: what all queues hold, what receivers borrow, what is kept
+/// for successors, and what is being filled.
+fn frames_of_publisher(schedule: &TickSchedule, topic: Topic) -> usize {
+    let depth = consumer_depth(schedule, topic);
+    MAX_CONSUMERS * (depth + MAX_BORROWED) + MAX_TAPS * (OBSERVER_DEPTH + MAX_BORROWED) + depth + MAX_LOANED
+}
+
+/// Shared memory that a run of this schedule needs: its frames, and room for what iceoryx2 keeps of
+/// every port and connection.
+pub fn required_bytes(schedule: &TickSchedule) -> u64 {
+    /// A topic with one consumer and one tap keeps four files beside its frames, a page each; successors
+    /// and nodes add to them.
+    const OVERHEAD_BYTES: usize = 64 << 10;
+    /// Of a sample: iceoryx2's header and alignment.
+    const HEADER_BYTES: usize = 64;
+    schedule
+        .outputs()
+        .map(|(_, output)| {
+            let frame = output.size_bytes + size_of::<Envelope>() + HEADER_BYTES;
+            (frames_of_publisher(schedule, output.topic) * frame + OVERHEAD_BYTES) as u64
+        })
+        .sum()
+}
+
+/// Why a process has no ports.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The run's domain can't be used.
+    #[error(transparent)]
+    Domain(#[from] DomainError),
+    /// iceoryx2 can't be used.
+    #[error("iceoryx2 can't be used in {path}: {reason}")]
+    Node {
+        /// The run's directory.
+        path: String,
+        /// What it says.
+        reason: String,
+    },
+}
+
+/// What all ports of a process share.
+pub(super) struct Process {
+    node: Node<ipc::Service>,
+    member: Member,
+    schedule: TickSchedule,
+    domain: Domain,
+    /// All ports, to be connected before the first tick.
+    ports: RefCell<Vec<Rc<dyn UpdateConnections>>>,
+}
+
+impl Process {
+    fn open(run: &Path, member: Member, schedule: &TickSchedule) -> Result<Rc<Self>, OpenError> {
+        // Nothing but our own words on standard output; what iceoryx2 reports comes back as errors.
+        set_log_level(LogLevel::Fatal);
+        let domain = Domain::of(run);
+        let mut config = domain.config()?;
+        // A successor makes room for its ports.
+        config.global.node.cleanup_dead_nodes_on_creation = member.epoch() > 1;
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|error| OpenError::Node {
+                path: run.display().to_string(),
+                reason: error.to_string(),
+            })?;
+        Ok(Rc::new(Self { node, member, schedule: schedule.clone(), domain, ports: RefCell::default() }))
+    }
+
+    fn service<P: Payload>(&self, topic: Topic) -> Result<Factory<P>, ConnectError> {
+        let failed = |reason: String| ConnectError::Failed { topic, reason };
+        let name = format!("{}/{}", topic.payload, topic.robot);
+        let name = name.as_str().try_into().map_err(|error| failed(format!("{error:?}")))?;
+        self.node
+            .service_builder(&name)
+            .publish_subscribe::<Frame<P>>()
+            .max_publishers(MAX_PUBLISHERS)
+            .max_subscribers(MAX_CONSUMERS + MAX_TAPS)
+            .max_nodes(MAX_NODES)
+            .subscriber_max_buffer_size(OBSERVER_DEPTH)
+            .subscriber_max_borrowed_samples(MAX_BORROWED)
+            // For a successor: the frames that its predecessor would still have used.
+            .history_size(consumer_depth(&self.schedule, topic))
+            // A receiver that stalls loses frames and notices; a publisher never waits for one. Where a
+            // tick depends on a frame nothing is lost: a queue holds more than can be on its way.
+            .enable_safe_overflow(true)
+            .open_or_create()
+            .map_err(|error| failed(error.to_string()))
+    }
+
+    fn subscribe<P: Payload>(
+        &self,
+        topic: Topic,
+        depth: usize,
+        history: usize,
+    ) -> Result<Rc<IceoryxSubscriberPort<ipc::Service, Frame<P>, ()>>, ConnectError> {
+        let port = self
+            .service::<P>(topic)?
+            .subscriber_builder()
+            .buffer_size(depth)
+            .history_request(history)
+            .create()
+            .map_err(|error| ConnectError::Failed { topic, reason: error.to_string() })?;
+        Ok(self.keep(port))
+    }
+
+    fn keep<T: UpdateConnections + 'static>(&self, port: T) -> Rc<T> {
+        let port = Rc::new(port);
+        self.ports.borrow_mut().push(Rc::clone(&port) as Rc<dyn UpdateConnections>);
+        port
+    }
+
+    fn reason_for(&self, topic: Topic) -> Option<Reason> {
+        self.schedule.outputs().position(|(_, output)| output.topic == topic).map(Reason::output)
+    }
+
+    fn slot_of(&self, role: Role) -> Option<usize> {
+        self.member.board().index_of(role)
+    }
+
+    /// Connects all ports to those that others have.
+    pub(super) fn connect(&self) {
+        for port in self.ports.borrow().iter() {
+            // A port that can't be connected now tries again at its next frame, and fails there.
+            let _ = port.update_connections();
+        }
+    }
+
+    /// Meets all others, connects all ports, and touches all memory.
+    fn start(&self) -> Result<(), TickError> {
+        self.member.meet(State::Wired)?;
+        self.member.watch_all();
+        self.connect();
+        let files = self.domain.shared_memory_files().unwrap_or_default();
+        populate(&files).map_err(|_| TickError::SharedMemoryFull)?;
+        self.member.meet(State::Ready)?;
+        self.member.enter(State::Running);
+        Ok(())
+    }
+}
+
+type Factory<P> = PortFactory<ipc::Service, Frame<P>, ()>;
+
+/// The ports of a service that has a process of its own.
+#[derive(Clone)]
+pub struct IceoryxTransport {
+    pub(super) process: Rc<Process>,
+    service: ServiceId,
+    /// Whether its phase opens the tick: then it also keeps the run within the tap's reach.
+    opens_tick: bool,
+}
+
+impl IceoryxTransport {
+    /// The ports of the service whose place `member` is, in the run of this directory.
+    ///
+    /// # Errors
+    /// The domain or iceoryx2 can't be used.
+    ///
+    /// # Panics
+    /// `member` is not a service.
+    pub fn open(run: &Path, member: Member, schedule: &TickSchedule) -> Result<Self, OpenError> {
+        let Role::Service(service) = member.role() else { panic!("{} has no ports", member.role()) };
+        let opens_tick = schedule.phases().first().is_some_and(|phase| phase.service == service);
+        Ok(Self { process: Process::open(run, member, schedule)?, service, opens_tick })
+    }
+
+    /// Its place on the board.
+    pub fn member(&self) -> &Member {
+        &self.process.member
+    }
+}
+
+impl Session for IceoryxTransport {
+    fn start(&self) -> Result<(), TickError> {
+        self.process.start()
+    }
+
+    fn begin_tick(&self, tick: u64) -> Result<(), TickError> {
+        self.process.member.begin_tick(tick)?;
+        if self.opens_tick {
+            self.process.member.wait_for_tap((tick + 1).saturating_sub(TAP_LEAD_TICKS))?;
+        }
+        Ok(())
+    }
+
+    fn finish(&self, ticks: u64, outcome: Result<(), TickError>) -> Result<(), TickError> {
+        let member = &self.process.member;
+        let met = outcome.and_then(|()| {
+            if self.opens_tick {
+                member.wait_for_tap(ticks)?;
+            }
+            // Nobody takes its ports away while others may still read from them.
+            member.meet(State::Done)
+        });
+        if let Err(error) = &met {
+            member.fail(error);
+        }
+        met
+    }
+}
+
+impl Transport for IceoryxTransport {
+    type Publisher<P: Payload> = IceoryxPublisher<P>;
+    type Subscriber<P: ServicePayload> = IceoryxSubscriber<P>;
+
+    fn publisher<P: Payload>(&self, robot: usize) -> Result<IceoryxPublisher<P>, ConnectError> {
+        let (topic, service, process) = (Topic::of::<P>(robot), self.service, &self.process);
+        let schedule = &process.schedule;
+        let reason = process
+            .reason_for(topic)
+            .filter(|_| schedule.producer_of(topic) == Some(service))
+            .ok_or(ConnectError::NotAnOutput { service, topic })?;
+        let frames = frames_of_publisher(schedule, topic);
+        let port = process
+            .service::<P>(topic)?
+            .publisher_builder()
+            .max_loaned_samples(MAX_LOANED)
+            // iceoryx2 would reserve the deepest queue for each receiver.
+            .override_sample_preallocation(move |_| frames)
+            .create()
+            .map_err(|error| ConnectError::Failed { topic, reason: error.to_string() })?;
+        let readers = schedule
+            .consumers_of(topic)
+            .map(|(consumer, _)| Role::Service(consumer))
+            .chain([Role::Tap])
+            .filter_map(|role| process.slot_of(role))
+            .collect();
+        let epoch = process.member.epoch();
+        Ok(IceoryxPublisher {
+            process: Rc::clone(process),
+            port: process.keep(port),
+            topic,
+            epoch,
+            reason,
+            readers,
+        })
+    }
+
+    fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<IceoryxSubscriber<P>, ConnectError> {
+        let (topic, service, process) = (Topic::of::<P>(robot), self.service, &self.process);
+        let not_an_input = ConnectError::NotAnInput { service, topic };
+        let Some(input) = process.schedule.input_of(service, topic) else { return Err(not_an_input) };
+        let (Some(reason), Some(from)) =
+            (process.reason_for(topic), process.slot_of(Role::Service(input.from)))
+        else {
+            return Err(not_an_input);
+        };
+        let depth = consumer_depth(&process.schedule, topic);
+        let port = process.subscribe(topic, depth, depth)?;
+        Ok(IceoryxSubscriber {
+            process: Rc::clone(process),
+            port,
+            topic,
+            reason,
+            from,
+            arrived: Box::new(Frame::zeroed()),
+        })
+    }
+}
+
+/// Publishes one topic, and wakes those who sleep for it.
+pub struct IceoryxPublisher<P: Payload> {
+    process: Rc<Process>,
+    port: Rc<IceoryxPort<ipc::Service, Frame<P>, ()>>,
+    topic: Topic,
+    epoch: u64,
+    reason: Reason,
+    readers: Vec<usize>,
+}
+
+impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
+    type Loan<'a> = IceoryxLoan<'a, P>;
+
+    fn loan(&mut self, tick: u64) -> Result<IceoryxLoan<'_, P>, TickError> {
+        let mut sample = self.port.loan_uninit().map_err(|error| match error {
+            LoanError::OutOfMemory | LoanError::ExceedsMaxLoans => {
+                TickError::PublisherFull { topic: self.topic, tick }
+            }
+            _ => TickError::TransportFailed { topic: self.topic },
+        })?;
+        let frame = sample.payload_mut();
+        *frame = MaybeUninit::zeroed();
+        // SAFETY: a frame consists of `Pod` values, for which all zeros are valid, and it was zeroed in
+        // the line above.
+        let mut sample = unsafe { sample.assume_init() };
+        sample.payload_mut().envelope = Envelope {
+            schema_hash: P::SCHEMA_HASH,
+            epoch: self.epoch,
+            tick,
+            robot: self.topic.robot as u64,
+            stamp_ns: 0,
+        };
+        Ok(IceoryxLoan { sample, publisher: self })
+    }
+}
+
+/// A frame that is being filled in shared memory.
+pub struct IceoryxLoan<'a, P: Payload> {
+    pub(super) sample: SampleMut<ipc::Service, Frame<P>, ()>,
+    publisher: &'a IceoryxPublisher<P>,
+}
+
+impl<P: Payload> Loan<P> for IceoryxLoan<'_, P> {
+    fn payload_mut(&mut self) -> &mut P {
+        &mut self.sample.payload_mut().payload
+    }
+
+    fn send(mut self) -> Result<(), TickError> {
+        let publisher = self.publisher;
+        let now = clock_gettime(ClockId::Monotonic);
+        self.sample.payload_mut().envelope.stamp_ns = now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64;
+        self.sample.send().map_err(|_| TickError::TransportFailed { topic: publisher.topic })?;
+        let slots = publisher.process.member.board().slots();
+        for slot in publisher.readers.iter().filter_map(|index| slots.get(*index)) {
+            slot.bed.wake(publisher.reason);
+        }
+        Ok(())
+    }
+}
+
+/// Receives one topic, and sleeps until it comes.
+pub struct IceoryxSubscriber<P: Payload> {
+    process: Rc<Process>,
+    port: Rc<IceoryxSubscriberPort<ipc::Service, Frame<P>, ()>>,
+    topic: Topic,
+    reason: Reason,
+    /// The publisher's slot.
+    from: usize,
+    /// Where frames are copied to before they are looked at: shared memory may change under the eyes.
+    arrived: Box<Frame<P>>,
+}
+
+impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
+    fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
+        let Self { process, port, topic, reason, from, arrived } = self;
+        let announced_epoch =
+            || process.member.board().slots().get(*from).map_or(0, |slot| slot.epoch.load(Ordering::Acquire));
+        process.member.wait_for(*reason, || {
+            while let Some(sample) =
+                port.receive().map_err(|_| TickError::TransportFailed { topic: *topic })?
+            {
+                **arrived = *sample.payload();
+                drop(sample);
+                if judge(arrived, *topic, announced_epoch(), tick)? == Verdict::Use {
+                    return Ok(Some(()));
+                }
+            }
+            Ok(None)
+        })?;
+        *frame = **arrived;
+        Ok(())
+    }
+}
+
+/// The ports of the run's tap.
+#[derive(Clone)]
+pub struct IceoryxTap {
+    process: Rc<Process>,
+    opener: Option<usize>,
+    consumed: Rc<Cell<u64>>,
+}
+
+impl IceoryxTap {
+    /// The ports of the tap whose place `member` is, in the run of this directory.
+    ///
+    /// # Errors
+    /// The domain or iceoryx2 can't be used.
+    pub fn open(run: &Path, member: Member, schedule: &TickSchedule) -> Result<Self, OpenError> {
+        let process = Process::open(run, member, schedule)?;
+        let opener =
+            schedule.phases().first().and_then(|phase| process.slot_of(Role::Service(phase.service)));
+        Ok(Self { process, opener, consumed: Rc::default() })
+    }
+
+    /// Meets all services before the first tick, once all observers have been made.
+    ///
+    /// # Errors
+    /// A process is lost, the run is to stop, or shared memory is full.
+    pub fn start(&self) -> Result<(), TickError> {
+        self.process.start()
+    }
+
+    /// Says that every frame of this many ticks has been consumed: the run stays within
+    /// [`TAP_LEAD_TICKS`] of it.
+    pub fn set_consumed(&self, ticks: u64) {
+        self.consumed.set(ticks);
+        let member = &self.process.member;
+        member.slot().set_tick(ticks);
+        if let Some(slot) = self.opener.and_then(|index| member.board().slots().get(index)) {
+            slot.bed.wake(Reason::CREDIT);
+        }
+    }
+
+    /// Says that nothing more will be consumed: the run goes on without.
+    pub fn detach(&self) {
+        self.process.member.conclude();
+    }
+}
+
+impl Tap for IceoryxTap {
+    type Observer<P: Payload> = IceoryxObserver<P>;
+
+    fn observer<P: Payload>(&self, robot: usize) -> Result<IceoryxObserver<P>, ConnectError> {
+        let topic = Topic::of::<P>(robot);
+        let reason = self.process.reason_for(topic).ok_or(ConnectError::NotPublished { topic })?;
+        // A tap is there from the first tick: what was before is nothing.
+        let port = self.process.subscribe(topic, OBSERVER_DEPTH, 0)?;
+        Ok(IceoryxObserver { process: Rc::clone(&self.process), port, topic, reason })
+    }
+}
+
+/// Sees all frames of one topic.
+pub struct IceoryxObserver<P: Payload> {
+    process: Rc<Process>,
+    port: Rc<IceoryxSubscriberPort<ipc::Service, Frame<P>, ()>>,
+    topic: Topic,
+    reason: Reason,
+}
+
+impl<P: Payload> IceoryxObserver<P> {
+    /// Waits for the next frame in order. None follows once all services have ended.
+    ///
+    /// # Errors
+    /// A process is lost or the run is to stop, and no frame is left.
+    pub fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
+        let process = Rc::clone(&self.process);
+        process.member.wait_for(self.reason, || {
+            // Asked first: what was published before the end is found after it.
+            let ended = process.member.all_services_have_ended();
+            let found = self.try_receive(frame)?;
+            Ok((found || ended).then_some(found))
+        })
+    }
+}
+
+impl<P: Payload> Observer<P> for IceoryxObserver<P> {
+    fn try_receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
+        let topic = self.topic;
+        let Some(sample) = self.port.receive().map_err(|_| TickError::TransportFailed { topic })? else {
+            return Ok(false);
+        };
+        *frame = *sample.payload();
+        if frame.envelope.schema_hash != P::SCHEMA_HASH {
+            return Err(TickError::WrongSchema { topic });
+        }
+        Ok(true)
+    }
+}
