@@ -11,6 +11,7 @@
 #![allow(non_snake_case)]
 
 pub mod balance;
+pub mod estimate;
 pub mod gait;
 pub mod ik;
 pub mod kinematics;
