@@ -1,5 +1,7 @@
 //! One tick of the hybrid law, by number of two-armed robots.
 
+#![allow(non_snake_case)]
+
 use divan::{Bencher, black_box};
 use mikoshi_cooperation::{
     GeneralizedForce, GeneralizedPosition, HandInput, HybridInputs, HybridLaw, HybridParameters,

@@ -46,8 +46,8 @@ mod workspace;
 pub use gain_bound::{RECOMMENDED_SHARE, critical_loop_gain, loop_gain};
 pub use generalized::{Generalized, GeneralizedForce, GeneralizedPosition, GeneralizedVelocity};
 pub use hybrid::{
-    BuildHybridLawError, HandInput, HandReference, HybridError, HybridInputs, HybridLaw, HybridOutput,
-    HybridParameters, HybridReference, HybridScratch, HybridState, RowGains, StartHybridError,
+    BuildHybridLawError, HandInput, HandReference, HandStiffness, HybridError, HybridInputs, HybridLaw,
+    HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, RowGains, StartHybridError,
 };
 pub use internal_forces::{
     BuildInternalForcesError, InternalForces, RowCombination, change_of_representation, pair_matrix,

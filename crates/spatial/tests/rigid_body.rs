@@ -126,10 +126,12 @@ proptest! {
     }
 
     #[test]
-    fn poses_survive_the_array(X_WH in pose::<World, Hand>()) {
-        let back = Pose::from_array(&X_WH.to_array()).unwrap();
-        prop_assert!(is_close(&X_WH, &back));
-        prop_assert_eq!(X_WH.translation, back.translation);
+    fn poses_survive_the_array_bit_by_bit(X_WH in pose::<World, Hand>(), X_HB in pose::<Hand, Tip>(), d in twist()) {
+        prop_assert_eq!(Pose::from_array(&X_WH.to_array()), Some(X_WH));
+        let displaced = X_WH.displaced(&d);
+        prop_assert_eq!(Pose::from_array(&displaced.to_array()), Some(displaced));
+        let composed = X_WH * X_HB;
+        prop_assert_eq!(Pose::from_array(&composed.to_array()), Some(composed));
     }
 
     #[test]

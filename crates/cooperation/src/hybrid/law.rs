@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{GeneralizedForce, GeneralizedPosition, InternalForces, WorkspaceScratch};
 use core::f64::consts::PI;
-use mikoshi_spatial::{Object, Pose, Twist, World, Wrench};
+use mikoshi_spatial::{CoordinateFrame, Hand, Object, Pose, Twist, World, Wrench};
 use nalgebra::{Vector3, Vector6};
 
 /// The hybrid law for one choice of internal forces and parameters. Immutable: what changes from tick to
@@ -66,6 +66,11 @@ impl HybridLaw {
     /// Number n of arms.
     pub fn arms(&self) -> usize {
         self.internal_forces.arms()
+    }
+
+    /// k_z k_h S of each row.
+    pub(super) fn force_gains(&self) -> impl Iterator<Item = Vector6<f64>> {
+        self.rows.iter().map(|row| row.force_gain)
     }
 
     /// Workspaces of its size.
@@ -227,11 +232,7 @@ impl HybridLaw {
 
     /// Anti-windup: a reference that leads its robot by no more than the limits, and whether it had to be
     /// held back.
-    fn within_lead(
-        &self,
-        hand: &HandInput,
-        wanted: Pose<World, mikoshi_spatial::Hand>,
-    ) -> (Pose<World, mikoshi_spatial::Hand>, bool) {
+    fn within_lead(&self, hand: &HandInput, wanted: Pose<World, Hand>) -> (Pose<World, Hand>, bool) {
         let lead = hand.pose_commanded.displacement_to(&wanted);
         let (linear, is_far) = shortened(lead.linear, self.parameters.lead_limit_m);
         let (angular, is_turned_far) = shortened(lead.angular, self.parameters.lead_limit_rad);
@@ -249,7 +250,7 @@ impl RowLaw {
     /// Deviation from eq. 39, which subtracts all of z_c: fig. 4 has an (I − S) there. Without it force
     /// axes become springs and keep a standing force. The sign holds for f the wrench that a hand applies
     /// TO the object.
-    fn displacement<F: mikoshi_spatial::CoordinateFrame>(
+    fn displacement<F: CoordinateFrame>(
         &self,
         force_error: &Wrench<F>,
         position_error: &Twist<F>,
