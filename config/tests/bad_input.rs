@@ -3,17 +3,21 @@
 //! Each case changes one file of `fixture/` or adds options; paths in the expected text are relative to it.
 
 use mikoshi_config::{LoadConfigError, LoadedScenario, load_robot, load_scenario};
+use proptest::prelude::*;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 const SCENARIO: &str = "scenarios/lift.toml";
 const TEAM: &str = "teams/pair.toml";
 const ROBOT: &str = "robots/arm.toml";
 
+fn original() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixture")
+}
+
 fn fixture() -> TempDir {
-    let copy = TempDir::new().unwrap();
-    let original = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixture");
+    let (copy, original) = (TempDir::new().unwrap(), original());
     for folder in ["scenarios", "teams", "robots"] {
         fs::create_dir(copy.path().join(folder)).unwrap();
         for entry in fs::read_dir(original.join(folder)).unwrap() {
@@ -511,4 +515,35 @@ fn errors_found_later_still_know_the_line() {
     let error =
         text_of(root.path(), Err::<(), _>(robot.error_at("hands.0.palm_link", "found x, expected y")));
     assert_eq!(error, "robots/arm.toml:10: hands.0.palm_link: found x, expected y");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever happens to a file, its reader gets a scenario or an error that names a place.
+    #[test]
+    fn damaged_files_never_panic(
+        file in prop::sample::select(vec![SCENARIO, TEAM, ROBOT]),
+        at in any::<prop::sample::Index>(),
+        length in 0..40_usize,
+        patch in "[a-z0-9 =.,\"\\[\\]{}\n#-]{0,12}",
+    ) {
+        let root = fixture();
+        let path = root.path().join(file);
+        let mut text = fs::read_to_string(&path).unwrap();
+        let start = at.index(text.len());
+        text.replace_range(start..(start + length).min(text.len()), &patch);
+        fs::write(&path, text).unwrap();
+        if let Err(error) = load(root.path(), &[]) {
+            prop_assert!(error.to_string().contains(".toml"), "{}", error);
+        }
+    }
+
+    /// Whatever is typed, too.
+    #[test]
+    fn options_never_panic(key in "[a-z_.0-9]{1,20}", value in ".{0,20}") {
+        let root = original();
+        let _ = load(&root, &[&format!("{key}={value}")]);
+        let _ = load(&root, &[&format!("robots.{key}={value}")]);
+    }
 }
