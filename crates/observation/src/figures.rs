@@ -2,7 +2,7 @@
 
 use crate::canonical::Observation;
 use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
-use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotTruth, mode};
+use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotTruth, TeamState, mode};
 use mikoshi_spatial::{Hand, Object, Pose, World, Wrench};
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
@@ -103,12 +103,12 @@ impl Figures {
     /// Takes in one tick. Ticks come in order.
     pub fn observe(&mut self, observation: &Observation) {
         let tick = observation.tick();
-        let Some(X_WA) = Pose::<World, Object>::from_array(&observation.object_truth.payload.pose) else {
+        let Some(X_WBody) = Pose::<World, Object>::from_array(&observation.object_truth.payload.pose) else {
             return;
         };
+        let team_state = &observation.team_state.payload;
+        let X_WA = self.object.observe(&X_WBody, team_state, self.run.hybrid_start_tick.is_none());
         self.observe_internal_forces(tick, &X_WA, observation);
-        let is_judged = self.run.hybrid_start_tick.is_none_or(|start| tick >= start);
-        self.object.observe(&X_WA, &observation.team_state.payload.object_pose_ref, is_judged);
         for (figures, truth) in self.robots.iter_mut().zip(&observation.robot_truth) {
             figures.observe(&truth.payload);
         }
@@ -200,32 +200,47 @@ fn tip_wrench(truth: &RobotTruth, hand: usize, X_WA: &Pose<World, Object>) -> Wr
 
 #[derive(Clone, Debug, Default)]
 struct ObjectFigures {
-    start: Option<Pose<World, Object>>,
+    first: Option<Pose<World, Object>>,
     last: Option<Pose<World, Object>>,
+    /// Σa in the body of the object: where control has it when it starts to follow a reference. The paper
+    /// lets it be anywhere on the object, and creates it with the virtual sticks.
+    X_BodyA: Option<Pose<Object, Object>>,
     samples: u64,
     squares: [f64; 6],
     peaks: [f64; 6],
 }
 
 impl ObjectFigures {
-    fn observe(&mut self, X_WA: &Pose<World, Object>, reference: &[f64; 7], is_judged: bool) {
-        self.start.get_or_insert(*X_WA);
-        self.last = Some(*X_WA);
-        let Some(X_WA_ref) = Pose::<World, Object>::from_array(reference).filter(|_| is_judged) else {
-            return;
+    /// Takes in the object's true pose, and returns that of Σa. Without a law to follow, `is_uncontrolled`,
+    /// there is no Σa but the body's own frame.
+    fn observe(
+        &mut self,
+        X_WBody: &Pose<World, Object>,
+        team_state: &TeamState,
+        is_uncontrolled: bool,
+    ) -> Pose<World, Object> {
+        self.first.get_or_insert(*X_WBody);
+        self.last = Some(*X_WBody);
+        let reference = Pose::<World, Object>::from_array(&team_state.object_pose_ref);
+        let is_judged = is_uncontrolled || team_state.team_mode == mode::HYBRID;
+        let Some(X_WA_ref) = reference.filter(|_| is_judged) else {
+            return *X_WBody;
         };
+        let X_BodyA = *self.X_BodyA.get_or_insert_with(|| X_WBody.inverse() * X_WA_ref);
+        let X_WA = *X_WBody * X_BodyA;
         self.samples += 1;
-        let error = X_WA_ref.displacement_to(X_WA).to_array();
+        let error = X_WA_ref.displacement_to(&X_WA).to_array();
         for axis in 0..6 {
             self.squares[axis] += error[axis] * error[axis];
             self.peaks[axis] = self.peaks[axis].max(error[axis].abs());
         }
+        X_WA
     }
 
     fn finish(&self) -> ObjectSummary {
         let rms = self.squares.map(|sum| (sum / self.samples.max(1) as f64).sqrt());
-        let travel = match (&self.start, &self.last) {
-            (Some(start), Some(last)) => start.displacement_to(last).to_array(),
+        let travel = match (&self.first, &self.last) {
+            (Some(first), Some(last)) => first.displacement_to(last).to_array(),
             _ => [0.0; 6],
         };
         let split = |v: [f64; 6]| ([v[0], v[1], v[2]], [v[3], v[4], v[5]]);
@@ -239,6 +254,7 @@ impl ObjectFigures {
             attitude_peak_rad,
             travel_m,
             travel_rad,
+            frame_offset_m: self.X_BodyA.map_or([0.0; 3], |X_BodyA| X_BodyA.translation.into()),
         }
     }
 }

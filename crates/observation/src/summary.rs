@@ -35,7 +35,8 @@ pub struct Summary {
     pub swaps: Vec<Swap>,
 }
 
-/// How well the object kept to its reference, from the start of the hybrid law on.
+/// How well Σa, as it was fixed to the object when the hybrid law started, kept to its reference from then
+/// on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct ObjectSummary {
@@ -47,6 +48,9 @@ pub struct ObjectSummary {
     pub travel_m: [f64; 3],
     /// True rotation over the whole run.
     pub travel_rad: [f64; 3],
+    /// Where Σa, the frame that control created on the object when it started, lies in the object's body:
+    /// what the hands could not know of how they grasped.
+    pub frame_offset_m: [f64; 3],
 }
 
 /// One internal force: norms of its force and of its moment, true and unfiltered.

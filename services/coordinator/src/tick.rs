@@ -153,11 +153,20 @@ impl Coordinator {
             out,
         );
         if state.team_mode == mode::HOLD && self.hybrid_start_tick.is_some_and(|start| tick + 1 >= start) {
-            // Control starts where the object is, not where it should be: nothing jumps.
-            state.object_pose_at_start = law_output.position.external.to_array();
-            state.team_mode = mode::HYBRID;
+            self.start_hybrid(state, hands, &law_output.position.external);
         }
         Ok(())
+    }
+
+    /// Creates the virtual sticks anew from the hands as they are now (section 4.3, step 2): whatever the
+    /// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the
+    /// object from here on. Control starts where the object is, not where it should be: nothing jumps.
+    fn start_hybrid(&self, state: &mut CoordinatorState, hands: &[HandInput], X_WA: &Pose<World, Object>) {
+        for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
+            *slot = VirtualStick::at_grasp(&hand.pose, X_WA).X_HB.to_array();
+        }
+        state.object_pose_at_start = X_WA.to_array();
+        state.team_mode = mode::HYBRID;
     }
 
     fn write_commands(&self, tick: u64, team_mode: u64, law: &HybridOutput, out: &mut CoordinatorOutputs) {
