@@ -1,11 +1,14 @@
 //! Where feet belong (Fig. 6, eq. 40) and where the next step may go.
 
+mod team;
+
 use core::f64::consts::PI;
 use mikoshi_humanoid::balance::{PerFoot, Side};
 use mikoshi_humanoid::gait::{FootError, FootPlacement, GroundPose, StepLimits, heading, wrap};
 use mikoshi_spatial::{Hand, Pose, Twist, World, exp};
 use nalgebra::{Rotation2, Vector2, Vector3};
 use proptest::prelude::*;
+use team::soles;
 
 fn feet() -> PerFoot<GroundPose> {
     PerFoot { right: GroundPose::new(0.0, -0.085, 0.0), left: GroundPose::new(0.0, 0.085, 0.0) }
@@ -14,10 +17,7 @@ fn feet() -> PerFoot<GroundPose> {
 /// The palms of the carry posture: toed in, rolled, not level.
 fn hands() -> [Pose<World, Hand>; 2] {
     [-1.0, 1.0].map(|side| {
-        Pose::new(
-            Vector3::new(0.35, 0.25 * side, 0.96),
-            exp(&Vector3::new(0.7 * side, -1.1, 0.6 * side)),
-        )
+        Pose::new(Vector3::new(0.35, 0.25 * side, 0.96), exp(&Vector3::new(0.7 * side, -1.1, 0.6 * side)))
     })
 }
 
@@ -60,7 +60,7 @@ proptest! {
     fn a_foothold_never_leaves_its_limits_and_soles_never_meet(
         stance in any_ground_pose(), x in -1.0..1.0, y in -1.0..1.0, yaw in -PI..PI, left in any::<bool>(),
     ) {
-        let limits = StepLimits::default();
+        let limits = StepLimits::standard(soles());
         let swing = if left { Side::Left } else { Side::Right };
         let desired = stance.then(&GroundPose::new(x, y, yaw));
         let step = stance.inverse().then(&limits.foothold(swing, &stance, &desired));
@@ -70,12 +70,14 @@ proptest! {
         prop_assert!(lateral >= 0.145 - 0.02 && lateral <= limits.lateral_max_m + 1e-9);
         // Every corner of the swing sole stays beyond the stance foot's inner edge by the gap that
         // parallel feet keep.
-        let [x_min, x_max, y_min, y_max] = limits.right_sole_m;
-        let gap = limits.lateral_min_m - 2.0 * y_max;
-        for corner in [(x_min, y_min), (x_min, y_max), (x_max, y_min), (x_max, y_max)] {
-            let corner = Vector2::new(corner.0, -corner.1 * swing.sign());
-            let at = step.position + Rotation2::new(step.yaw) * corner;
-            prop_assert!(at.y * swing.sign() >= y_max + gap - 1e-9, "{at}");
+        let sole = limits.soles[swing];
+        let inner = limits.soles.right.y_max;
+        let gap = limits.lateral_min_m - 2.0 * inner;
+        for x in [sole.x_min, sole.x_max] {
+            for y in [sole.y_min, sole.y_max] {
+                let at = step.position + Rotation2::new(step.yaw) * Vector2::new(x, y);
+                prop_assert!(at.y * swing.sign() >= inner + gap - 1e-9, "{at}");
+            }
         }
     }
 
@@ -83,7 +85,7 @@ proptest! {
     fn a_foothold_within_reach_is_taken_as_it_is(
         stance in any_ground_pose(), x in -0.22..0.22, lateral in 0.19..0.28, yaw in -0.25..0.25,
     ) {
-        let limits = StepLimits::default();
+        let limits = StepLimits::standard(soles());
         let desired = stance.then(&GroundPose::new(x, lateral, yaw));
         prop_assert!(near(&limits.foothold(Side::Left, &stance, &desired), &desired));
     }
@@ -152,7 +154,7 @@ fn heading_ignores_pitch_and_roll_of_either_order() {
 
 #[test]
 fn the_foot_on_the_side_of_a_lateral_motion_or_turn_leads() {
-    let limits = StepLimits::default();
+    let limits = StepLimits::standard(soles());
     let first = |motion: GroundPose| {
         limits.first_swing(&feet(), &PerFoot::from_fn(|side| motion.then(&feet()[side])))
     };

@@ -35,6 +35,7 @@ fn gains_are_those_of_an_independent_riccati_solver() {
             horizon_s: golden.horizon_s,
             error_weight: golden.error_weight,
             jerk_weight: golden.jerk_weight,
+            ..PreviewConfig::default()
         })
         .expect("solvable");
         assert!(close(control.gain_error(), golden.gain_error, 1e-9), "{}", control.gain_error());
@@ -138,4 +139,46 @@ fn a_robot_at_rest_over_its_reference_stays_there() {
         control.advance(&mut state, core::iter::repeat(place));
     }
     assert!((state.com - place).norm() < 1e-9);
+}
+
+#[test]
+fn a_plan_that_changes_at_short_notice_moves_the_zmp_by_centimetres_only() {
+    let control = PreviewControl::new(&PreviewConfig::default()).expect("solvable");
+    let walk = ZmpReference::resting(Vector2::zeros()).shift(80, 180, Vector2::new(0.0, 0.085));
+    let mut state = PreviewState::at_rest(Vector2::zeros());
+    let mut worst = 0.0_f64;
+    for tick in 0..800 {
+        control.advance(&mut state, (tick..).map(|tick| walk.at(tick)));
+        worst = worst.max((control.zmp(&state) - walk.at(tick + 1)).norm());
+    }
+    assert!(worst < 0.045, "{worst}");
+    assert!((state.com.y - 0.085).abs() < 1e-4, "{}", state.com);
+}
+
+#[test]
+fn the_linear_law_is_what_remains_without_a_limit() {
+    let unlimited = PreviewConfig { deviation_max_m: f64::INFINITY, ..PreviewConfig::default() };
+    let [limited, linear] =
+        [PreviewConfig::default(), unlimited].map(|config| PreviewControl::new(&config).expect("solvable"));
+    let reference = walk();
+    let (mut a, mut b) = (PreviewState::at_rest(Vector2::zeros()), PreviewState::at_rest(Vector2::zeros()));
+    for tick in 0..1600 {
+        for (control, state) in [(&limited, &mut a), (&linear, &mut b)] {
+            control.advance(state, (tick..).map(|tick| reference.at(tick)));
+        }
+    }
+    assert!((a.com - b.com).norm() < 1e-12, "a plan that was known in time never meets the limit");
+}
+
+#[test]
+fn no_state_is_out_of_reach_of_the_limited_law() {
+    let control = PreviewControl::new(&PreviewConfig::default()).expect("solvable");
+    for (position, velocity) in [(0.5, 0.0), (0.0, 2.0), (-0.3, -1.0), (0.02, 0.05)] {
+        let mut state = PreviewState::at_rest(Vector2::new(position, 0.0));
+        state.com_velocity.x = velocity;
+        for _ in 0..3000 {
+            control.advance(&mut state, core::iter::repeat(Vector2::zeros()));
+        }
+        assert!(state.com.norm() < 1e-3, "from {position} m, {velocity} m/s to {}", state.com);
+    }
 }

@@ -11,6 +11,7 @@ use super::swing::{Foothold, SwingConfig, SwingContact};
 use super::team_clock::StepWish;
 use super::zmp_reference::ZmpReference;
 use crate::balance::{ExternalLoad, PerFoot, Side};
+use crate::estimate::SoleRectangle;
 use mikoshi_spatial::{Foot, Pose, Twist, World};
 use nalgebra::{Vector2, Vector3};
 
@@ -29,9 +30,8 @@ pub struct GaitConfig {
     pub start: FootError,
     /// Foot errors (eq. 40) below which it can stop.
     pub stop: FootError,
-    /// Where under the right foot the zero moment point shall rest, in the foot's frame, the left one
-    /// mirrored \[m\].
-    pub zmp_in_right_foot_m: [f64; 2],
+    /// Where under each foot the zero moment point shall rest, in the foot's frame \[m\].
+    pub zmp_in_foot: PerFoot<Vector2<f64>>,
     /// Whether the robot swings its right foot where the team's clock says left, so that robots that
     /// face each other swing on one side of the world and sway together.
     pub mirrored: bool,
@@ -43,17 +43,20 @@ pub struct GaitConfig {
 }
 
 impl GaitConfig {
-    /// Parameters that work for HRP-2.
-    pub fn standard() -> Self {
+    /// Parameters that work for HRP-2, for feet with these soles: the zero moment point rests halfway
+    /// between toe and heel, under the ankle's axis.
+    pub fn standard(soles: PerFoot<SoleRectangle>) -> Self {
         let preview = PreviewConfig::default();
         Self {
             timing: StepTiming::standard(preview.control_period_s),
-            limits: StepLimits::default(),
+            limits: StepLimits::standard(soles),
             swing: SwingConfig::default(),
             preview,
             start: FootError { position: 0.03, yaw: 0.05 },
             stop: FootError { position: 0.02, yaw: 0.03 },
-            zmp_in_right_foot_m: [0.015, 0.0],
+            zmp_in_foot: PerFoot::from_fn(|side| {
+                Vector2::new((soles[side].x_min + soles[side].x_max) / 2.0, 0.0)
+            }),
             mirrored: false,
             reference_lead_s: 0.4,
             load_filter_s: 0.5,
@@ -66,6 +69,8 @@ impl GaitConfig {
 pub struct GaitState {
     /// What the legs do.
     pub phase: GaitPhase,
+    /// The foot that the body moves about: the one that stands, or of two the one that does next.
+    pub stance: Side,
     /// Where each foot stands, or last stood.
     pub feet: PerFoot<Foothold>,
     /// d₁, d₂ of Fig. 6, once there is a grasp.
@@ -107,6 +112,8 @@ pub struct FootReference {
 /// References at the end of the tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaitReference {
+    /// The foot that the body moves about.
+    pub stance: Side,
     /// Feet.
     pub feet: PerFoot<FootReference>,
     /// Centre of mass \[m, world\].
@@ -142,6 +149,7 @@ impl Gait {
     pub fn standing(&self, feet: PerFoot<GroundPose>, com: Vector2<f64>) -> GaitState {
         GaitState {
             phase: GaitPhase::Standing { zmp: com },
+            stance: Side::Right,
             feet: PerFoot::from_fn(|side| Foothold::on_ground(feet[side])),
             placement: None,
             preview: PreviewState::at_rest(com),
@@ -161,13 +169,12 @@ impl Gait {
         };
         let timing = &self.config.timing;
         // Feet and swing foot as they are when the next undecided step starts, and ticks to its landing.
-        let feet = PerFoot::from_fn(|side| state.feet[side].pose);
+        let feet = footholds(state);
         let (feet, swing, ticks) = match state.clock {
             StepClock::Stepping { step_index, tick_in_step, swing, will_continue: true } => {
                 let side = swing.mirrored(self.config.mirrored);
                 let remaining = timing.step(step_index).saturating_sub(tick_in_step + 1);
-                let landed = self.after_landing(&feet, &state.phase);
-                (landed, side.opposite(), remaining + timing.step(step_index + 1))
+                (after_step(feet, &state.phase), side.opposite(), remaining + timing.step(step_index + 1))
             }
             StepClock::Standing => {
                 let ticks = timing.step(0);
@@ -204,7 +211,7 @@ impl Gait {
             timing,
             feet: &state.feet,
             zmp_ref: state.zmp_ref,
-            middle: self.middle(&PerFoot::from_fn(|side| state.feet[side].pose)),
+            middle: self.middle(&footholds(state)),
             mirrored: self.config.mirrored,
         });
         let share = self.swing_share(&inputs.clock);
@@ -214,6 +221,7 @@ impl Gait {
             state.feet[side] = foothold;
         }
         self.plan_step(state, inputs);
+        state.stance = stance(&state.phase).unwrap_or(state.stance);
 
         let blend = dt / (self.config.load_filter_s + dt);
         state.load = state.load.filtered_towards(&inputs.load, blend);
@@ -242,6 +250,7 @@ impl Gait {
         });
         let PreviewState { com, com_velocity, com_acceleration, .. } = state.preview;
         GaitReference {
+            stance: state.stance,
             feet,
             com: com.push(self.config.preview.com_height_m),
             com_velocity: com_velocity.push(0.0),
@@ -270,9 +279,9 @@ impl Gait {
 
     /// The step that is planned but not begun follows the moving references.
     fn plan_step(&self, state: &mut GaitState, inputs: &GaitInputs) {
-        let feet = PerFoot::from_fn(|side| state.feet[side].pose);
+        let feet = footholds(state);
         let (Some(step), StepClock::Stepping { step_index, tick_in_step, .. }) =
-            (state.phase.planned_step(), inputs.clock)
+            (state.phase.planned_step_mut(), inputs.clock)
         else {
             return;
         };
@@ -295,28 +304,9 @@ impl Gait {
         self.config.limits.foothold(swing, &feet[swing.opposite()], &aim[swing])
     }
 
-    /// Feet after the landing of the step that is planned or under way.
-    fn after_landing(&self, feet: &PerFoot<GroundPose>, phase: &GaitPhase) -> PerFoot<GroundPose> {
-        let mut feet = *feet;
-        match phase {
-            GaitPhase::ShiftingWeight { step, .. } | GaitPhase::DoubleSupport { step, .. } => {
-                feet[step.side] = step.to;
-            }
-            GaitPhase::SingleSupport { foot, .. } => {
-                feet[foot.side] = match foot.swing.contact {
-                    SwingContact::Swinging { .. } => foot.swing.to.pose,
-                    SwingContact::Landed { at } | SwingContact::Lowering { at, .. } => at.pose,
-                };
-            }
-            GaitPhase::Standing { .. } | GaitPhase::Finishing { .. } => {}
-        }
-        feet
-    }
-
     /// Where the zero moment point shall rest under a foot.
     fn zmp_under(&self, side: Side, foot: &GroundPose) -> Vector2<f64> {
-        let [x, y] = self.config.zmp_in_right_foot_m;
-        foot.point(&Vector2::new(x, -y * side.sign()))
+        foot.point(&self.config.zmp_in_foot[side])
     }
 
     fn middle(&self, feet: &PerFoot<GroundPose>) -> Vector2<f64> {
@@ -328,7 +318,7 @@ impl Gait {
     /// than the preview feels.
     fn zmp_reference(&self, state: &GaitState, inputs: &GaitInputs) -> ZmpReference {
         let timing = &self.config.timing;
-        let feet = PerFoot::from_fn(|side| state.feet[side].pose);
+        let feet = footholds(state);
         let shift_to = |reference: ZmpReference, start: i64, ticks: u64, point| {
             reference.shift(start, start + ticks as i64, point)
         };
@@ -355,7 +345,7 @@ impl Gait {
                     _ => ZmpReference::resting(under_stance),
                 };
                 let landing = step_start + timing.step(step_index) as i64;
-                let landed = self.after_landing(&feet, &phase);
+                let landed = after_step(feet, &phase);
                 if !will_continue {
                     return shift_to(reference, landing, timing.double_support, self.middle(&landed));
                 }
@@ -367,7 +357,12 @@ impl Gait {
                     stepped[stance] =
                         self.foothold(placement, centre, &landed, stance, next_landing.max(0) as u64);
                 }
-                shift_to(reference, next_landing, timing.double_support, self.middle(&stepped))
+                shift_to(
+                    reference,
+                    next_landing,
+                    timing.double_support,
+                    self.zmp_under(stance, &stepped[stance]),
+                )
             }
             (_, _) => ZmpReference::resting(state.zmp_ref),
         }
@@ -378,4 +373,33 @@ impl Gait {
 fn relative_error(reference: &PerFoot<GroundPose>, feet: &PerFoot<GroundPose>, threshold: &FootError) -> f64 {
     let of = |side| FootError::between(&reference[side], &feet[side]).relative_to(threshold);
     of(Side::Right).max(of(Side::Left))
+}
+
+/// Where each foot stands, or will when it comes down.
+fn footholds(state: &GaitState) -> PerFoot<GroundPose> {
+    let mut feet = PerFoot::from_fn(|side| state.feet[side].pose);
+    if let Some(SwingingFoot { side, swing }) = state.phase.swinging_foot() {
+        feet[side] = match swing.contact {
+            SwingContact::Swinging { .. } => swing.to.pose,
+            SwingContact::Landed { at } | SwingContact::Lowering { at, .. } => at.pose,
+        };
+    }
+    feet
+}
+
+/// The foot that stands while the other one swings, or will.
+fn stance(phase: &GaitPhase) -> Option<Side> {
+    let moving = match phase.swinging_foot() {
+        Some(foot) => Some(foot.side),
+        None => phase.planned_step().map(|step| step.side),
+    };
+    moving.map(Side::opposite)
+}
+
+/// Footholds after the step that is planned, if one is.
+fn after_step(mut feet: PerFoot<GroundPose>, phase: &GaitPhase) -> PerFoot<GroundPose> {
+    if let Some(step) = phase.planned_step() {
+        feet[step.side] = step.to;
+    }
+    feet
 }

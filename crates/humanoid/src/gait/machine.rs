@@ -199,7 +199,12 @@ impl GaitPhase {
     }
 
     /// The step that is planned but not begun.
-    pub fn planned_step(&mut self) -> Option<&mut PlannedStep> {
+    pub fn planned_step(mut self) -> Option<PlannedStep> {
+        self.planned_step_mut().copied()
+    }
+
+    /// The same, for the planner to move.
+    pub fn planned_step_mut(&mut self) -> Option<&mut PlannedStep> {
         match self {
             Self::ShiftingWeight { step, .. } | Self::DoubleSupport { step, .. } => Some(step),
             _ => None,

@@ -17,6 +17,9 @@ pub struct PreviewConfig {
     pub error_weight: f64,
     /// R: weight of the jerk's change.
     pub jerk_weight: f64,
+    /// How far the zero moment point may leave its reference per axis when a plan changes within the
+    /// horizon \[m\]; infinite for the linear law.
+    pub deviation_max_m: f64,
 }
 
 impl Default for PreviewConfig {
@@ -27,6 +30,7 @@ impl Default for PreviewConfig {
             horizon_s: 1.6,
             error_weight: 1.0,
             jerk_weight: 1e-6,
+            deviation_max_m: 0.02,
         }
     }
 }
@@ -34,8 +38,8 @@ impl Default for PreviewConfig {
 /// Why there are no gains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SolvePreviewError {
-    /// A period, height, horizon or jerk weight that is not positive, or an error weight below zero.
-    #[error("preview control needs positive period, height, horizon and weights")]
+    /// A period, height, horizon, weight or deviation that is not positive.
+    #[error("preview control needs positive period, height, horizon, weights and deviation")]
     NotPositive,
     /// The Riccati equation has no stabilising solution for these numbers.
     #[error("the Riccati equation of preview control has no stabilising solution")]
@@ -75,9 +79,16 @@ impl PreviewState {
 /// - Gp(1) = −Gi, Gp(j) = (R + B̃ᵀPB̃)⁻¹ B̃ᵀ X(j−1), X(1) = −Ãcᵀ P e₁, X(j) = Ãcᵀ X(j−1),
 ///   Ãc = Ã − B̃ K̃.
 ///
-/// Deviation from the source: the last gain holds the sum of all that lie past the horizon, i.e. the
+/// First deviation from the source: the last gain holds the sum of all that lie past the horizon, i.e. the
 /// reference is taken to stay as it is there. That makes the law exactly invariant to where the origin
 /// lies; truncated, it would pull a robot far from the origin towards it.
+///
+/// Second deviation: where a plan changes within the horizon (a walk starts, a stop is decided), the
+/// linear law with so small an R corrects the centre of mass within two ticks, by a zero moment point
+/// decimetres off and a jolt of several m/s². Here the jerk is limited so that p leaves its reference
+/// by no more than `deviation_max_m`, which spreads the same correction over a tenth of a second.
+/// Beyond it the deviation goes on with a small slope, twice what holds an unstable pendulum, so that
+/// no state is out of reach.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreviewControl {
     transition: Matrix3<f64>,
@@ -86,15 +97,18 @@ pub struct PreviewControl {
     gain_error: f64,
     gain_state: RowVector3<f64>,
     gain_preview: Vec<f64>,
+    deviation_max: f64,
+    slope_beyond: f64,
 }
 
 impl PreviewControl {
     /// Solves for the gains.
     pub fn new(config: &PreviewConfig) -> Result<Self, SolvePreviewError> {
-        let PreviewConfig { control_period_s: dt, com_height_m, horizon_s, error_weight, jerk_weight } =
-            *config;
-        let positive = [dt, com_height_m, horizon_s, jerk_weight].iter().all(|value| *value > 0.0);
-        if !(positive && error_weight > 0.0) {
+        let PreviewConfig {
+            control_period_s: dt, com_height_m, horizon_s, error_weight, jerk_weight, ..
+        } = *config;
+        let positive = [dt, com_height_m, horizon_s, error_weight, jerk_weight, config.deviation_max_m];
+        if !positive.iter().all(|value| *value > 0.0) {
             return Err(SolvePreviewError::NotPositive);
         }
         let transition = Matrix3::new(1.0, dt, dt * dt / 2.0, 0.0, 1.0, dt, 0.0, 0.0, 1.0);
@@ -127,7 +141,12 @@ impl PreviewControl {
         if let Some(last) = gain_preview.last_mut() {
             *last += gain_of(&tail);
         }
+        // By how much p leaves its reference per metre that the divergent component is off; a pendulum
+        // diverges where that is less than one.
+        let stiffness = -(output * input).x * k[1];
         Ok(Self {
+            deviation_max: config.deviation_max_m,
+            slope_beyond: (2.0 / stiffness).min(1.0),
             transition,
             input,
             output,
@@ -152,7 +171,7 @@ impl PreviewControl {
         &self.gain_preview
     }
 
-    /// Zero moment point of the cart-table \[m\].
+    /// Zero moment point of the cart-table, the extended one where there is a load \[m\].
     pub fn zmp(&self, state: &PreviewState) -> Vector2<f64> {
         state.com + state.com_acceleration * self.output.z
     }
@@ -173,18 +192,29 @@ impl PreviewControl {
         let error = zmp - now;
         state.error_sum += error;
 
-        let (mut ahead, mut preview) = (now, Vector2::zeros());
+        let mut ahead = zmp_ref.next().unwrap_or(now);
+        let next_ref = ahead;
+        let mut preview = Vector2::zeros();
         for gain in &self.gain_preview {
-            ahead = zmp_ref.next().unwrap_or(ahead);
             preview += ahead * *gain;
+            ahead = zmp_ref.next().unwrap_or(ahead);
         }
         for axis in 0..2 {
             let x = Vector3::new(state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]);
             let jerk = -self.gain_error * state.error_sum[axis] - (self.gain_state * x).x - preview[axis];
-            let next = self.transition * x + self.input * jerk;
+            let free = self.transition * x;
+            // p(k+1) = C (A x + B u), so a limit of p is one of u.
+            let (drift, effect) = ((self.output * free).x - next_ref[axis], (self.output * self.input).x);
+            let jerk = (self.limited(drift + effect * jerk) - drift) / effect;
+            let next = free + self.input * jerk;
             (state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]) =
                 (next.x, next.y, next.z);
         }
         error
+    }
+
+    fn limited(&self, deviation: f64) -> f64 {
+        let within = deviation.clamp(-self.deviation_max, self.deviation_max);
+        within + self.slope_beyond * (deviation - within)
     }
 }

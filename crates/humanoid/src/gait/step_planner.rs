@@ -2,6 +2,7 @@
 
 use super::ground_pose::{GroundPose, wrap};
 use crate::balance::{PerFoot, Side};
+use crate::estimate::SoleRectangle;
 use nalgebra::Vector2;
 
 /// How far one step may go, relative to the stance foot, and the soles that must not meet.
@@ -15,25 +16,16 @@ pub struct StepLimits {
     pub lateral_max_m: f64,
     /// Heading against the stance foot, either way \[rad\].
     pub yaw_rad: f64,
-    /// Sole rectangle of the right foot in its frame, the left one mirrored: `[x_min, x_max, y_min,
-    /// y_max]` \[m\].
-    pub right_sole_m: [f64; 4],
-}
-
-impl Default for StepLimits {
-    /// For HRP-2's soles.
-    fn default() -> Self {
-        Self {
-            reach_m: 0.22,
-            lateral_min_m: 0.145,
-            lateral_max_m: 0.28,
-            yaw_rad: 0.25,
-            right_sole_m: [-0.1056, 0.1356, -0.079, 0.059],
-        }
-    }
+    /// Soles in their feet's frames.
+    pub soles: PerFoot<SoleRectangle>,
 }
 
 impl StepLimits {
+    /// .22 m ahead and back, .145 to .28 m aside, .25 rad.
+    pub fn standard(soles: PerFoot<SoleRectangle>) -> Self {
+        Self { reach_m: 0.22, lateral_min_m: 0.145, lateral_max_m: 0.28, yaw_rad: 0.25, soles }
+    }
+
     /// The foothold of foot `swing` nearest to `desired` within reach of `stance`: heading first, then
     /// length, then width.
     ///
@@ -43,18 +35,18 @@ impl StepLimits {
         let wished = stance.inverse().then(desired);
         let yaw = wished.yaw.clamp(-self.yaw_rad, self.yaw_rad);
         let x = wished.position.x.clamp(-self.reach_m, self.reach_m);
-        let lateral_min = self.lateral_min_m + self.inward(yaw * swing.sign()) - self.inward(0.0);
+        let lateral_min = self.lateral_min_m + self.inward(swing, yaw) - self.inward(swing, 0.0);
         let outwards = wished.position.y * swing.sign();
         let lateral = outwards.max(lateral_min).min(self.lateral_max_m.max(lateral_min));
         stance.then(&GroundPose { position: Vector2::new(x, lateral * swing.sign()), yaw })
     }
 
-    /// How far the sole reaches inwards of its origin when turned outwards by `toe_out` \[m\].
-    fn inward(&self, toe_out: f64) -> f64 {
-        let [x_min, x_max, _, y_max] = self.right_sole_m;
-        // As for a right foot, whose inner edge is y_max: toes out is a negative yaw.
-        let (sin, cos) = (-toe_out).sin_cos();
-        (x_min * sin).max(x_max * sin) + y_max * cos
+    /// How far the sole of foot `side` reaches inwards of its origin when turned by `yaw` \[m\].
+    fn inward(&self, side: Side, yaw: f64) -> f64 {
+        let SoleRectangle { x_min, x_max, y_min, y_max } = self.soles[side];
+        let (sin, cos) = yaw.sin_cos();
+        let inner = if side == Side::Left { y_min } else { y_max };
+        [x_min, x_max].map(|x| -side.sign() * (x * sin + inner * cos)).into_iter().fold(f64::MIN, f64::max)
     }
 
     /// The foot that had better swing first: the one after whose step, within the limits, both feet
@@ -73,7 +65,7 @@ impl StepLimits {
 
     /// One number for position and heading, which a sole's half length makes comparable \[m\].
     fn distance(&self, a: &GroundPose, b: &GroundPose) -> f64 {
-        let half_length = (self.right_sole_m[1] - self.right_sole_m[0]) / 2.0;
+        let half_length = (self.soles.right.x_max - self.soles.right.x_min) / 2.0;
         (a.position - b.position).norm() + wrap(a.yaw - b.yaw).abs() * half_length
     }
 }
