@@ -8,10 +8,12 @@
 
 mod error;
 mod robot;
+mod run_file;
 mod schedule;
 mod surface;
 
 pub use error::ResolveRunError;
+pub use run_file::{RunFileError, read_run, write_run};
 pub use schedule::tick_schedule;
 
 use mikoshi_config::{LoadedScenario, RunSpec};

@@ -113,9 +113,7 @@ pub struct DoctorArguments {
 
 fn key_and_value(typed: &str) -> Result<(String, String), String> {
     match typed.split_once('=') {
-        Some((key, value)) if !key.trim().is_empty() => {
-            Ok((key.trim().to_owned(), value.trim().to_owned()))
-        }
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
         _ => Err("expected KEY=VALUE, such as object.mass_kg=4".to_owned()),
     }
 }

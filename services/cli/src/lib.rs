@@ -1,15 +1,86 @@
 //! The mikoshi command: run, plan, status, doctor.
+//!
+//! Two programs share this library: `mikoshi`, which runs a scenario as one process per service, and
+//! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process` becomes.
+//! Only the latter links to the simulator: without its library `mikoshi` still starts, and says what is
+//! missing.
 
 pub mod arguments;
+mod binaries;
+mod children;
+pub mod commands;
 pub mod failure;
 mod fraction;
-mod print;
+mod gain;
+pub mod interrupts;
+mod judge;
+mod observed_run;
+pub mod observer;
+pub mod outcome;
+pub mod output_directory;
+pub mod prepare;
+pub mod print;
+mod progress;
+mod report;
+mod supervisor;
+mod table;
 
+use arguments::{Arguments, Command, RunArguments};
 use clap::Parser;
+use failure::{Failure, Status, as_lines};
+use std::env;
+use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
+use tracing_subscriber::EnvFilter;
 
-/// The whole command: parses what was typed, does it, says what went wrong.
+/// The whole `mikoshi` command.
 pub fn main_of_command() -> ExitCode {
-    let _ = arguments::Arguments::parse();
-    ExitCode::SUCCESS
+    start_logging();
+    conclude(match &Arguments::parse().command {
+        Command::Run(arguments) if arguments.in_process => become_in_process(),
+        Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
+        Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),
+        Command::Status(arguments) => commands::status::status(arguments).map(|()| Status::Met),
+        Command::Doctor(arguments) => commands::doctor::doctor(arguments),
+    })
+}
+
+/// `mikoshi-in-process` reads the same command line; `run` carries out what it asks for.
+pub fn main_of_in_process(run: impl FnOnce(&RunArguments) -> Result<Status, Failure>) -> ExitCode {
+    start_logging();
+    conclude(match &Arguments::parse().command {
+        Command::Run(arguments) => run(arguments),
+        _ => Err(Failure {
+            status: Status::Usage,
+            message: "this program only runs; use `mikoshi`".to_owned(),
+        }),
+    })
+}
+
+/// Replaces this process, so that signals and exit status need no passing on.
+fn become_in_process() -> Result<Status, Failure> {
+    binaries::simulator_version()?;
+    let program = binaries::find(binaries::IN_PROCESS)?;
+    let error = std::process::Command::new(&program).args(env::args_os().skip(1)).exec();
+    Err(Failure::fault(error).context(program.display()))
+}
+
+fn conclude(result: Result<Status, Failure>) -> ExitCode {
+    let status = result.unwrap_or_else(|failure| {
+        print::print_error(&as_lines("error", &failure.message));
+        failure.status
+    });
+    status.into()
+}
+
+/// Warnings of libraries go to standard error; `MIKOSHI_LOG` changes what is told.
+fn start_logging() {
+    let filter = EnvFilter::try_from_env("MIKOSHI_LOG").unwrap_or_else(|_| EnvFilter::new("warn"));
+    let colours = env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    // It fails where somebody logs already.
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colours && std::io::IsTerminal::is_terminal(&std::io::stderr()))
+        .try_init();
 }

@@ -1,0 +1,38 @@
+//! The run in the directory where its processes meet.
+
+use mikoshi_config::{DecodeRunError, RunSpec};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Its name in the run's directory.
+const RUN_FILE: &str = "run.bin";
+
+/// Why a run can't be passed on.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum RunFileError {
+    #[error("{}: {source}", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{}: {source}", path.display())]
+    Decode { path: PathBuf, source: DecodeRunError },
+}
+
+/// Writes a run for all processes that join it.
+///
+/// # Errors
+/// The file can't be written.
+pub fn write_run(directory: &Path, run: &RunSpec) -> Result<(), RunFileError> {
+    let path = directory.join(RUN_FILE);
+    fs::write(&path, run.encode()).map_err(|source| RunFileError::Io { path, source })
+}
+
+/// Reads the run of a directory.
+///
+/// # Errors
+/// The file can't be read, or is not a run of this build.
+pub fn read_run(directory: &Path) -> Result<RunSpec, RunFileError> {
+    let path = directory.join(RUN_FILE);
+    let bytes = fs::read(&path).map_err(|source| RunFileError::Io { path: path.clone(), source })?;
+    RunSpec::decode(&bytes).map_err(|source| RunFileError::Decode { path, source })
+}

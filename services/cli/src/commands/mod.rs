@@ -1,0 +1,6 @@
+//! One module per command.
+
+pub mod doctor;
+pub mod plan;
+pub mod run;
+pub mod status;

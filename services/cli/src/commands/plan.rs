@@ -1,0 +1,277 @@
+//! `mikoshi plan`: what a scenario comes to, before anything runs.
+
+use crate::arguments::PlanArguments;
+use crate::failure::{Failure, as_lines};
+use crate::fraction::Fraction;
+use crate::gain::GainReport;
+use crate::prepare::{Prepared, prepare};
+use crate::print::{print_error, print_out};
+use crate::table;
+use core::fmt::Write as _;
+use mikoshi_config::scenario::{Scenario, Thresholds};
+use mikoshi_cooperation::Control;
+use mikoshi_ipc_types::{MAX_HANDS, MAX_JOINTS, MAX_ROBOTS};
+use mikoshi_runtime::{Input, required_bytes};
+use serde::Serialize;
+
+/// Prints the plan.
+///
+/// # Errors
+/// The scenario can't be run.
+pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
+    let prepared = prepare(&arguments.scenario)?;
+    let plan = Plan::of(&prepared);
+    if arguments.json {
+        let mut text = serde_json::to_string_pretty(&plan).map_err(Failure::fault)?;
+        text.push('\n');
+        print_out(&text);
+    } else {
+        print_out(&plan.to_text(&prepared));
+    }
+    if let Some(warning) = plan.gains.warning() {
+        print_error(&as_lines("warning", &warning));
+    }
+    Ok(())
+}
+
+/// What `mikoshi plan --json` prints.
+#[derive(Debug, Serialize)]
+struct Plan<'a> {
+    scenario: &'a str,
+    description: &'a str,
+    seed: u64,
+    ticks: u64,
+    control_period_s: f64,
+    sim_time_s: f64,
+    hybrid_start_s: Option<f64>,
+    arms: Vec<Arm<'a>>,
+    rows: Vec<Row<'a>>,
+    matrices: Matrices,
+    gains: GainReport,
+    schedule: Vec<Phase>,
+    shared_memory_bytes: u64,
+    thresholds: &'a Thresholds,
+}
+
+/// One grasping arm.
+#[derive(Debug, Serialize)]
+struct Arm<'a> {
+    robot: &'a str,
+    model: &'a str,
+    hand: &'a str,
+    /// The palm in the object, `[x, y, z, qw, qx, qy, qz]`.
+    hand_in_object: [f64; 7],
+}
+
+/// One row of the generalized vectors, and what is controlled along its axes.
+#[derive(Debug, Serialize)]
+struct Row<'a> {
+    name: &'a str,
+    /// `force` or `position`, for x, y, z, roll, pitch and yaw.
+    control: [&'static str; 6],
+}
+
+/// Scalar matrices, row by row: each stands for its Kronecker product with I₆.
+#[derive(Debug, Serialize)]
+struct Matrices {
+    c: Vec<Vec<f64>>,
+    w_inverse: Vec<f64>,
+    v: Vec<Vec<f64>>,
+    u: Vec<Vec<f64>>,
+}
+
+/// One call of one service in a tick.
+#[derive(Debug, Serialize)]
+struct Phase {
+    service: String,
+    call: String,
+    core: Option<usize>,
+    budget_s: f64,
+    waits_for: Vec<String>,
+    publishes: Vec<String>,
+}
+
+impl<'a> Plan<'a> {
+    fn of(prepared: &'a Prepared) -> Self {
+        let (run, scenario) = (&prepared.run, &prepared.run.scenario);
+        let internal_forces = prepared.law.internal_forces();
+        Self {
+            scenario: &scenario.name,
+            description: &scenario.description,
+            seed: scenario.seed,
+            ticks: run.ticks,
+            control_period_s: scenario.control_period_s,
+            sim_time_s: run.ticks as f64 * scenario.control_period_s,
+            hybrid_start_s: scenario.hybrid.start_s,
+            arms: arms(prepared),
+            rows: rows(prepared),
+            matrices: Matrices {
+                c: by_row(&internal_forces.c()),
+                w_inverse: internal_forces.w_inverse().to_vec(),
+                v: by_row(&internal_forces.v()),
+                u: by_row(&internal_forces.u()),
+            },
+            gains: GainReport::of(prepared),
+            schedule: schedule(prepared),
+            shared_memory_bytes: required_bytes(&prepared.schedule),
+            thresholds: &scenario.thresholds,
+        }
+    }
+
+    fn to_text(&self, prepared: &Prepared) -> String {
+        let mut text = String::new();
+        let title = |text: &mut String, title: &str| {
+            // Writing to a string can't fail.
+            let _ = writeln!(text, "\n{title}");
+        };
+        let _ = writeln!(text, "{}: {}", self.scenario, self.description);
+        let start = self.hybrid_start_s.map_or("never".to_owned(), |start_s| format!("at {start_s} s"));
+        let _ = writeln!(
+            text,
+            "{} ticks of {} ms, {} s; seed {}; hybrid control starts {start}",
+            self.ticks,
+            1e3 * self.control_period_s,
+            self.sim_time_s,
+            self.seed
+        );
+
+        title(&mut text, "Arms, in hand order; palms in the object");
+        text += &arms_table(&self.arms);
+
+        title(&mut text, "Rows, and what is controlled along their axes");
+        let axes = ["row", "x", "y", "z", "roll", "pitch", "yaw"];
+        let cells = |row: &Row<'_>| {
+            core::iter::once(row.name.to_owned()).chain(row.control.map(str::to_owned)).collect()
+        };
+        text += &table::of_text(&axes, self.rows.iter().map(cells));
+
+        let arm_names: Vec<_> = self.arms.iter().map(|arm| format!("{}.{}", arm.robot, arm.hand)).collect();
+        let row_names: Vec<_> = self.rows.iter().map(|row| row.name.to_owned()).collect();
+        title(&mut text, "C: internal forces from the tips' wrenches (each number times I6)");
+        text += &matrix_table(&row_names[1..], &arm_names, &self.matrices.c);
+        title(
+            &mut text,
+            "U = [W⁻ V] = [W; C]⁻¹: the tips' wrenches from external and internal forces; W⁻ is its first column",
+        );
+        text += &matrix_table(&arm_names, &row_names, &self.matrices.u);
+
+        title(&mut text, "Loop gain");
+        text += &self.gains_text();
+        title(&mut text, "Schedule of a tick");
+        text += &prepared.schedule.to_string();
+        title(&mut text, "Limits");
+        text += &limits_text(&prepared.run.scenario, self.shared_memory_bytes);
+        text
+    }
+
+    fn gains_text(&self) -> String {
+        let gains = &self.gains;
+        let mut text = format!(
+            "{:.4} for the worst combination of force axes: {:.0} % of the critical {:.3} \
+             (at most {:.0} % recommended)\n\
+             {} ticks of delay, {} Hz filter, {} N/m and {} Nm/rad a hand\n",
+            gains.largest,
+            100.0 * gains.share(),
+            gains.critical,
+            100.0 * gains.recommended_share,
+            gains.delay_ticks,
+            gains.filter_hz,
+            gains.stiffness_n_m,
+            gains.stiffness_nm_rad
+        );
+        let percent = |gain: f64| format!("{:.0} %", 100.0 * gain / gains.critical);
+        text += &table::of_numbers(
+            &["row by itself", "force", "of critical", "moment", "of critical"],
+            gains.rows.iter().map(|row| {
+                let (force, moment) = (format!("{:.4}", row.force), format!("{:.4}", row.moment));
+                vec![row.name.clone(), force, percent(row.force), moment, percent(row.moment)]
+            }),
+        );
+        text
+    }
+}
+
+fn arms(prepared: &Prepared) -> Vec<Arm<'_>> {
+    prepared
+        .run
+        .robots
+        .iter()
+        .flat_map(|robot| {
+            robot.grasping_hands.iter().zip(&robot.hand_in_object).map(|(&hand, pose)| Arm {
+                robot: &robot.member.name,
+                model: &robot.config.name,
+                hand: &robot.config.hands[hand].name,
+                hand_in_object: *pose,
+            })
+        })
+        .collect()
+}
+
+fn rows(prepared: &Prepared) -> Vec<Row<'_>> {
+    let selection = prepared.law.parameters().selection.rows();
+    let name_of = |control: Control| match control {
+        Control::Force => "force",
+        Control::Position => "position",
+    };
+    let names = prepared.law.internal_forces().names().iter();
+    names.zip(selection).map(|(name, axes)| Row { name, control: axes.map(name_of) }).collect()
+}
+
+fn by_row(matrix: &nalgebra::DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+fn schedule(prepared: &Prepared) -> Vec<Phase> {
+    let period_s = prepared.run.scenario.control_period_s;
+    let input = |input: &Input| match input.age_ticks {
+        0 => input.topic.to_string(),
+        age => format!("{}@k-{age}", input.topic),
+    };
+    let phases = prepared.schedule.phases().iter();
+    phases
+        .map(|phase| Phase {
+            service: phase.service.to_string(),
+            call: phase.call.to_string(),
+            core: phase.core,
+            budget_s: phase.budget * period_s,
+            waits_for: phase.inputs.iter().map(input).collect(),
+            publishes: phase.outputs.iter().map(|output| output.topic.to_string()).collect(),
+        })
+        .collect()
+}
+
+fn arms_table(arms: &[Arm<'_>]) -> String {
+    let cells = |(index, arm): (usize, &Arm<'_>)| {
+        let [x, y, z, ..] = arm.hand_in_object;
+        let name = format!("{} {}.{}", index + 1, arm.robot, arm.hand);
+        vec![name, arm.model.to_owned(), format!("{x:.3}"), format!("{y:.3}"), format!("{z:.3}")]
+    };
+    table::of_numbers(&["arm", "model", "x [m]", "y [m]", "z [m]"], arms.iter().enumerate().map(cells))
+}
+
+fn matrix_table(rows: &[String], columns: &[String], matrix: &[Vec<f64>]) -> String {
+    let titles: Vec<&str> = core::iter::once("").chain(columns.iter().map(String::as_str)).collect();
+    let cells = |(name, row): (&String, &Vec<f64>)| {
+        let values = row.iter().map(|value| Fraction(*value).to_string());
+        core::iter::once(name.clone()).chain(values).collect()
+    };
+    table::of_numbers(&titles, rows.iter().zip(matrix).map(cells))
+}
+
+fn limits_text(scenario: &Scenario, shared_memory_bytes: u64) -> String {
+    let mut text = format!(
+        "at most {MAX_ROBOTS} robots, {MAX_HANDS} hands and {MAX_JOINTS} joints each; \
+         {:.1} MiB of shared memory\n",
+        shared_memory_bytes as f64 / f64::from(1 << 20)
+    );
+    match toml::to_string(&scenario.thresholds) {
+        Ok(thresholds) if !thresholds.is_empty() => {
+            text += "the run succeeds within\n";
+            for line in thresholds.lines() {
+                let _ = writeln!(text, "  {line}");
+            }
+        }
+        _ => text += "the run succeeds if no robot falls and nothing touches unintendedly\n",
+    }
+    text
+}

@@ -1,0 +1,67 @@
+//! `mikoshi run`: a scenario from its file to its summary.
+
+use crate::arguments::RunArguments;
+use crate::failure::{Failure, Status, as_lines};
+use crate::gain::GainReport;
+use crate::observer::RunObserver;
+use crate::outcome::Outcome;
+use crate::output_directory::OutputDirectory;
+use crate::prepare::{Prepared, prepare};
+use crate::print::{print_error, print_out};
+use crate::report::report;
+use mikoshi_observation::Summary;
+use std::fs;
+
+/// Runs a scenario; `execute` carries it out.
+///
+/// # Errors
+/// Bad usage or configuration, or a fault of the system. A run that does not meet its thresholds is no
+/// error: [`Status::NotMet`].
+pub fn run(
+    arguments: &RunArguments,
+    execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
+) -> Result<Status, Failure> {
+    let prepared = prepare(&arguments.scenario)?;
+    let scenario = &prepared.run.scenario;
+    if let Some(warning) = scenario.hybrid.start_s.and_then(|_| GainReport::of(&prepared).warning()) {
+        print_error(&as_lines("warning", &warning));
+    }
+    let out = match &arguments.out {
+        Some(path) => OutputDirectory::open(path, arguments.force)?,
+        None => OutputDirectory::fresh(&scenario.name, scenario.seed)?,
+    };
+    let text = toml::to_string(scenario).map_err(Failure::fault)?;
+    write(&out.scenario(), &text)?;
+
+    let mut observer = RunObserver::new(&prepared, &out, !arguments.quiet)?;
+    let outcome = execute(&prepared, &out, &mut observer)?;
+    let faults = match &outcome {
+        Outcome::Fault { faults, .. } => faults.clone(),
+        _ => vec![],
+    };
+    let summary = observer.finish(&prepared.run, faults)?;
+    write_summary(&out, &summary)?;
+    match outcome {
+        Outcome::Completed => {
+            if !arguments.quiet {
+                print_out(&report(&summary, out.path()));
+            }
+            Ok(if summary.passed { Status::Met } else { Status::NotMet })
+        }
+        Outcome::Interrupted(signal) => {
+            let message = format!("stopped after {} of {} ticks", summary.ticks, prepared.run.ticks);
+            Err(Failure { status: Status::Signal(signal), message })
+        }
+        Outcome::Fault { failure, .. } => Err(failure),
+    }
+}
+
+fn write_summary(out: &OutputDirectory, summary: &Summary) -> Result<(), Failure> {
+    let mut text = serde_json::to_string_pretty(summary).map_err(Failure::fault)?;
+    text.push('\n');
+    write(&out.summary(), &text)
+}
+
+fn write(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+    fs::write(path, text).map_err(|error| Failure::fault(error).context(path.display()))
+}

@@ -1,0 +1,118 @@
+//! Whether a run met its scenario's thresholds.
+
+use mikoshi_config::Scenario;
+use mikoshi_observation::{InternalSummary, RobotSummary, Summary};
+
+/// How long after its start the hybrid law is judged.
+const JUDGED_AFTER_S: f64 = 3.0;
+
+/// Every threshold that was not met, in words. Nothing that was not observed counts as met.
+pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
+    let limits = &scenario.thresholds;
+    let mut judge = Judge::default();
+    for robot in &summary.fell {
+        judge.fail(format!("robot {robot} fell"));
+    }
+    if summary.unintended_contact_ticks > 0 {
+        judge.fail(format!("something touched unintendedly in {} ticks", summary.unintended_contact_ticks));
+    }
+
+    if let Some(limit) = limits.internal_start_min_n {
+        let largest = largest(&summary.internal, |row| row.start_n);
+        if !(largest >= limit) {
+            judge.fail(format!(
+                "internal forces start at no more than {largest:.3} N, expected at least {limit} N"
+            ));
+        }
+    }
+    let is_judged_after_3s = scenario.hybrid.start_s.unwrap_or(0.0) + JUDGED_AFTER_S < summary.sim_time_s;
+    for (name, unit, limit, figure, is_observed) in [
+        (
+            "3 s after the start",
+            "N",
+            limits.internal_after_3s_n,
+            (|row| row.after_3s_n) as fn(&InternalSummary) -> f64,
+            is_judged_after_3s,
+        ),
+        ("3 s after the start", "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm, is_judged_after_3s),
+        ("at the end", "N", limits.internal_end_n, |row| row.end_n, true),
+        ("at the end", "Nm", limits.internal_end_nm, |row| row.end_nm, true),
+    ] {
+        let Some(limit) = limit else { continue };
+        if !is_observed {
+            judge.fail(format!("internal forces: the run ends before they are judged, {name}"));
+            continue;
+        }
+        for row in &summary.internal {
+            judge.at_most(format_args!("internal force {} {name}", row.name), figure(row), limit, unit);
+        }
+    }
+
+    let peak = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
+    if let Some(limit) = limits.object_position_peak_m {
+        judge.at_most("object position error", peak(summary.object.position_peak_m), limit, "m");
+    }
+    if let Some(limit) = limits.object_attitude_peak_rad {
+        judge.at_most("object attitude error", peak(summary.object.attitude_peak_rad), limit, "rad");
+    }
+    for robot in &summary.robots {
+        judge_robot(&mut judge, scenario, robot);
+    }
+    judge.failures
+}
+
+fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary) {
+    let limits = &scenario.thresholds;
+    let name = &robot.name;
+    if let Some(limit) = limits.foot_slip_max_m {
+        judge.at_most(format_args!("slip of the feet of {name}"), robot.foot_slip_max_m, limit, "m");
+    }
+    if let Some(limit) = limits.joint_margin_min_rad {
+        let what = format!("distance of {name}'s {} from its limit", robot.joint_margin_joint);
+        judge.at_least(what, robot.joint_margin_min_rad, limit, "rad");
+    }
+    if let Some(limit) = limits.zmp_margin_min_m {
+        judge.at_least(format_args!("ZMP margin of {name}"), robot.zmp_margin_min_m, limit, "m");
+    }
+    if let Some(limit) = limits.saturated_ticks_max
+        && robot.saturated_ticks > limit
+    {
+        let ticks = robot.saturated_ticks;
+        judge.fail(format!("drives of {name} saturated: {ticks} ticks, expected at most {limit}"));
+    }
+}
+
+fn largest(rows: &[InternalSummary], figure: impl Fn(&InternalSummary) -> f64) -> f64 {
+    rows.iter().map(figure).fold(0.0, f64::max)
+}
+
+#[derive(Default)]
+struct Judge {
+    failures: Vec<String>,
+}
+
+impl Judge {
+    fn fail(&mut self, what: String) {
+        self.failures.push(what);
+    }
+
+    // Both are written so that NaN fails.
+    fn at_most(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
+        if !(value <= limit) {
+            self.fail(format!("{what}: {}, expected at most {limit} {unit}", quantity(value, unit)));
+        }
+    }
+
+    fn at_least(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
+        if !(value >= limit) {
+            self.fail(format!("{what}: {}, expected at least {limit} {unit}", quantity(value, unit)));
+        }
+    }
+}
+
+/// Four significant digits, so that a value near its limit doesn't read like it.
+fn quantity(value: f64, unit: &str) -> String {
+    let digits = if value == 0.0 || !value.is_finite() { 0.0 } else { value.abs().log10().floor() };
+    let decimals = (3.0 - digits).clamp(0.0, 12.0) as usize;
+    format!("{value:.decimals$} {unit}")
+}

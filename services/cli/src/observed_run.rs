@@ -1,0 +1,44 @@
+//! What observers must know of a run.
+
+use crate::failure::Failure;
+use crate::prepare::Prepared;
+use mikoshi_config::RobotSpec;
+use mikoshi_humanoid::Model;
+use mikoshi_observation::{ObservedJoint, ObservedRobot, ObservedRun};
+use std::path::PathBuf;
+
+/// What observers must know of this run.
+///
+/// # Errors
+/// A robot's URDF can't be read. It was read before, so this is a fault.
+pub fn observed_run(prepared: &Prepared) -> Result<ObservedRun, Failure> {
+    let (run, internal_forces) = (&prepared.run, prepared.law.internal_forces());
+    let c = internal_forces.c();
+    let names = internal_forces.names().iter().skip(1).cloned();
+    let period_s = run.scenario.control_period_s;
+    Ok(ObservedRun {
+        control_period_s: period_s,
+        ticks: run.ticks,
+        hybrid_start_tick: run.scenario.hybrid.start_s.map(|start_s| (start_s / period_s).round() as u64),
+        robots: run.robots.iter().map(observed_robot).collect::<Result<_, _>>()?,
+        internal_rows: names.zip(c.row_iter().map(|row| row.iter().copied().collect())).collect(),
+    })
+}
+
+fn observed_robot(robot: &RobotSpec) -> Result<ObservedRobot, Failure> {
+    // Nobody looks at its meshes here.
+    let model = Model::from_urdf(&robot.urdf, &|mesh| Some(PathBuf::from(mesh)))
+        .map_err(|error| Failure::fault(error).context(&robot.member.name))?;
+    let joints = model.joints().iter().map(|joint| ObservedJoint {
+        name: joint.name.clone(),
+        lower_rad: joint.lower,
+        upper_rad: joint.upper,
+        torque_limit_nm: joint.effort,
+    });
+    Ok(ObservedRobot {
+        name: robot.member.name.clone(),
+        mass_kg: model.total_mass_kg(),
+        hands: robot.grasping_hands.len(),
+        joints: joints.collect(),
+    })
+}

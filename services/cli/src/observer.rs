@@ -1,0 +1,147 @@
+//! Watches a run tick by tick, and says at the end what it came to.
+
+use crate::failure::Failure;
+use crate::judge;
+use crate::observed_run::observed_run;
+use crate::output_directory::OutputDirectory;
+use crate::prepare::Prepared;
+use crate::progress::Progress;
+use core::time::Duration;
+use mikoshi_config::RunSpec;
+use mikoshi_observation::{Fault, Figures, LogHash, LogWriter, Observation, Summary, Timing, WriteLogError};
+use std::time::Instant;
+
+/// Observes a run: figures, hash, log, progress.
+pub struct RunObserver {
+    figures: Figures,
+    hash: LogHash,
+    log: LogWriter,
+    progress: Progress,
+    stamps: Stamps,
+    ticks: u64,
+    start: Instant,
+}
+
+impl RunObserver {
+    /// Nothing observed yet; the clock runs from here.
+    ///
+    /// # Errors
+    /// The log can't be written: [`Status::Fault`](crate::failure::Status::Fault).
+    pub fn new(prepared: &Prepared, out: &OutputDirectory, is_shown: bool) -> Result<Self, Failure> {
+        let run = &prepared.run;
+        Ok(Self {
+            figures: Figures::new(observed_run(prepared)?),
+            hash: LogHash::default(),
+            log: LogWriter::create(&out.run_log(), run).map_err(Failure::fault)?,
+            progress: Progress::new(run.ticks, run.scenario.control_period_s, is_shown),
+            stamps: Stamps::default(),
+            ticks: 0,
+            start: Instant::now(),
+        })
+    }
+
+    /// Takes in one tick.
+    ///
+    /// # Errors
+    /// The log can't be written.
+    pub fn observe(&mut self, observation: &Observation) -> Result<(), WriteLogError> {
+        self.hash.observe(observation);
+        self.figures.observe(observation);
+        self.stamps.observe(observation.object_truth.envelope.stamp_ns);
+        self.log.write(observation)?;
+        self.ticks += 1;
+        self.progress.set_ticks(self.ticks);
+        Ok(())
+    }
+
+    /// Ticks observed so far.
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// Closes the log, and judges the run.
+    ///
+    /// # Errors
+    /// The log can't be written: [`Status::Fault`](crate::failure::Status::Fault).
+    pub fn finish(self, run: &RunSpec, faults: Vec<Fault>) -> Result<Summary, Failure> {
+        let wall_time_s = self.start.elapsed().as_secs_f64();
+        self.progress.clear();
+        self.log.finish().map_err(Failure::fault)?;
+        let (figures, scenario) = (self.figures.finish(), &run.scenario);
+        let sim_time_s = self.ticks as f64 * scenario.control_period_s;
+        let mut summary = Summary {
+            scenario: scenario.name.clone(),
+            seed: scenario.seed,
+            ticks: self.ticks,
+            control_period_s: scenario.control_period_s,
+            sim_time_s,
+            wall_time_s,
+            real_time_factor: sim_time_s / wall_time_s,
+            passed: false,
+            failures: vec![],
+            log_hash: self.hash.to_hex(),
+            fell: figures.fell,
+            object: figures.object,
+            internal: figures.internal,
+            internal_measurement_error_n: figures.internal_measurement_error_n,
+            internal_measurement_error_nm: figures.internal_measurement_error_nm,
+            robots: figures.robots,
+            unintended_contact_ticks: figures.unintended_contact_ticks,
+            timing: self.stamps.timing(),
+            faults,
+            swaps: vec![],
+        };
+        if self.ticks < run.ticks {
+            summary.failures.push(format!("the run ended after {} of {} ticks", self.ticks, run.ticks));
+        } else {
+            summary.failures = judge::failures(scenario, &summary);
+        }
+        summary.passed = summary.failures.is_empty();
+        Ok(summary)
+    }
+}
+
+/// When ticks began, by the bridge's clock.
+#[derive(Default)]
+struct Stamps {
+    last_ns: Option<u64>,
+    periods_ns: Vec<u64>,
+}
+
+impl Stamps {
+    fn observe(&mut self, stamp_ns: u64) {
+        if let Some(last_ns) = self.last_ns.replace(stamp_ns) {
+            self.periods_ns.push(stamp_ns.saturating_sub(last_ns));
+        }
+    }
+
+    /// All zero where no clock was read. In lockstep nothing is late and nothing is held.
+    fn timing(mut self) -> Timing {
+        self.periods_ns.sort_unstable();
+        let quantile = |share: f64| {
+            let last = self.periods_ns.len().saturating_sub(1);
+            let index = (share * last as f64).round() as usize;
+            Duration::from_nanos(self.periods_ns.get(index).copied().unwrap_or_default()).as_secs_f64()
+        };
+        Timing { tick_p50_s: quantile(0.5), tick_p99_s: quantile(0.99), ticks_late: 0, ticks_held: 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_those_of_the_periods_between_stamps() {
+        let mut stamps = Stamps::default();
+        let mut stamp_ns = 1_000;
+        stamps.observe(stamp_ns);
+        for period_ns in (1..=100).rev() {
+            stamp_ns += period_ns;
+            stamps.observe(stamp_ns);
+        }
+        let timing = stamps.timing();
+        assert_eq!((timing.tick_p50_s, timing.tick_p99_s), (51e-9, 99e-9));
+        assert_eq!(Stamps::default().timing(), Timing::default());
+    }
+}

@@ -1,0 +1,51 @@
+//! From what was typed to a run that can be carried out.
+
+use crate::arguments::ScenarioArguments;
+use crate::failure::Failure;
+use mikoshi_config::{LoadedScenario, RunSpec, load_scenario};
+use mikoshi_cooperation::{HybridLaw, TeamArms};
+use mikoshi_coordinator::{BuildCoordinatorError, build_hybrid_law, team_arms};
+use mikoshi_resolution::{resolve, tick_schedule};
+use mikoshi_runtime::TickSchedule;
+
+/// A run, and what its services will build from it.
+pub struct Prepared {
+    /// The run.
+    pub run: RunSpec,
+    /// Its arms in hand order.
+    pub arms: TeamArms,
+    /// Its hybrid law.
+    pub law: HybridLaw,
+    /// Its schedule.
+    pub schedule: TickSchedule,
+}
+
+/// Reads, checks and resolves a scenario.
+///
+/// # Errors
+/// Whatever is wrong with it: [`Status::Usage`](crate::failure::Status::Usage).
+pub fn prepare(arguments: &ScenarioArguments) -> Result<Prepared, Failure> {
+    let loaded =
+        load_scenario(&arguments.scenario, &arguments.overrides, arguments.seed).map_err(Failure::usage)?;
+    let run = resolve(&loaded).map_err(Failure::usage)?;
+    let arms = team_arms(&run).map_err(Failure::usage)?;
+    let law = build_hybrid_law(&run).map_err(|error| place(&loaded, error))?;
+    let schedule = tick_schedule(&run).map_err(Failure::usage)?;
+    Ok(Prepared { run, arms, law, schedule })
+}
+
+/// Says where what the law objects to was written.
+fn place(loaded: &LoadedScenario, error: BuildCoordinatorError) -> Failure {
+    match &error {
+        BuildCoordinatorError::InternalForces(problem) => {
+            Failure::usage(loaded.error_at("hybrid.internal_forces", problem.to_string()))
+        }
+        BuildCoordinatorError::UnknownRow { found, expected } => {
+            let axes = &loaded.scenario.hybrid.axes;
+            let index = axes.iter().position(|axis| axis.row == *found).unwrap_or_default();
+            let problem = format!("found {found:?}, expected one of {expected}");
+            Failure::usage(loaded.error_at(&format!("hybrid.axes.{index}.row"), problem))
+        }
+        _ => Failure::usage(error),
+    }
+}
