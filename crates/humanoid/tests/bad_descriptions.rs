@@ -43,16 +43,22 @@ fn the_arm_of_these_tests_is_valid_as_it_stands() {
 }
 
 #[test]
-fn malformed_xml_is_refused() {
-    let error = Model::from_urdf("<robot name='x'><link name='a'>", &|_| None).unwrap_err();
-    assert!(matches!(error, LoadModelError::Malformed(_)), "{error}");
-    assert!(matches!(Model::from_urdf("", &|_| None), Err(LoadModelError::Malformed(_))));
+fn malformed_xml_is_refused_with_its_line() {
+    let message = |text: &str| Model::from_urdf(text, &|_| None).unwrap_err().to_string();
+    assert!(message("<robot name='x'>\n<link name='a'>\n</lnk></robot>").contains("line 3"));
+    assert!(message("").contains("malformed"));
+    assert!(message("<model/>").contains("<model>; expected <robot>"));
 }
 
 #[test]
-fn an_unknown_joint_type_is_refused_with_the_types_that_are_known() {
-    let message = refusal(&[link("a", MASS), link("b", MASS), joint("j", "screw", "a", "b", LIMIT)]);
-    assert!(message.contains("screw") && message.contains("revolute"), "{message}");
+fn an_element_that_cannot_be_read_is_refused_with_its_line_and_name() {
+    let screw = refusal(&[link("a", MASS), link("b", MASS), joint("j", "screw", "a", "b", LIMIT)]);
+    assert!(screw.contains("'j'") && screw.contains("screw") && screw.contains("revolute"), "{screw}");
+    let no_velocity = refusal(&arm(&LIMIT.replace(r#"velocity="1""#, ""), MASS));
+    assert!(no_velocity.contains("'shoulder'") && no_velocity.contains("velocity"), "{no_velocity}");
+    let no_number = format!("\n{}", link("arm", &MASS.replace("\"1\"", "\"one\"")));
+    let no_number = refusal(&[link("base", MASS), no_number]);
+    assert!(no_number.contains("line 2: link 'arm'"), "{no_number}");
 }
 
 #[test]
@@ -112,6 +118,7 @@ fn a_mass_or_an_inertia_that_no_body_has_is_refused() {
         (r#"mass value="1""#, r#"mass value="NaN""#),
         (r#"mass value="1""#, r#"mass value="0""#),
         (r#"ixx="1""#, r#"ixx="-1""#),
+        (r#"ixx="1""#, r#"ixx="0""#),
         (r#"ixx="1""#, r#"ixx="inf""#),
         (r#"ixx="1""#, r#"ixx="3""#),
         (r#"ixy="0""#, r#"ixy="2""#),
@@ -120,6 +127,11 @@ fn a_mass_or_an_inertia_that_no_body_has_is_refused() {
         assert!(message.contains("'arm'"), "{to}: {message}");
     }
     assert!(refusal(&arm(LIMIT, "")).contains("without mass"));
+    let negative = MASS.replace(r#"mass value="1""#, r#"mass value="-0.5""#);
+    let fixed = joint("weld", "fixed", "base", "plate", "");
+    let message = refusal(&[link("base", MASS), link("plate", &negative), fixed]);
+    assert!(message.contains("'plate'") && message.contains("-0.5 kg"), "{message}");
+    assert!(refusal(&arm(LIMIT, &MASS.replace(r#"ixx="1""#, r#"ixx="0""#))).contains("positive definite"));
 }
 
 #[test]

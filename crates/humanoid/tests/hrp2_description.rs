@@ -144,6 +144,10 @@ fn a_wrist_sensor_carries_the_gripper_and_an_ankle_sensor_nothing_that_weighs() 
         assert!(model.is_carried_by(find("sole"), find("ankle_sensor")));
         assert!(!model.is_carried_by(find("wrist_sensor"), find("palm")));
     }
+    // What hangs on a moving joint is not carried: its torque is the drive's.
+    let waist = model.find_frame("BODY").unwrap();
+    assert!(!model.is_carried_by(model.find_frame("r_sole").unwrap(), waist));
+    assert_eq!(model.carried_inertial(waist).mass_kg, model.bodies()[0].inertial.mass_kg);
 }
 
 #[test]

@@ -253,11 +253,11 @@ fn an_arm_speed_cap_binds_arms_and_nothing_else() {
     let ik = WholeBodyIk::new(&setup.model, config).unwrap();
     let mut setup = Carrying { ik, ..setup };
     let (mut state, mut targets) = (start, setup.targets);
-    for hand in 0..2 {
-        move_hand(&mut targets, hand, [0.0, 0.0, 0.1], [0.0; 3]);
-    }
+    // Hands up and about the robot, so that the chest turns too.
+    move_hand(&mut targets, 0, [0.1, 0.0, 0.1], [0.0; 3]);
+    move_hand(&mut targets, 1, [-0.1, 0.0, 0.1], [0.0; 3]);
     targets.com.z -= 0.02;
-    let (mut fastest_arm, mut fastest_leg) = (0.0_f64, 0.0_f64);
+    let (mut fastest_arm, mut fastest_leg, mut fastest_chest) = (0.0_f64, 0.0_f64, 0.0_f64);
     for _ in 0..100 {
         follow(&mut setup, &mut state, &targets, 1);
         for (j, joint) in setup.model.joints().iter().enumerate() {
@@ -265,12 +265,13 @@ fn an_arm_speed_cap_binds_arms_and_nothing_else() {
             match &joint.name[1..4] {
                 "ARM" => fastest_arm = fastest_arm.max(rate),
                 "LEG" => fastest_leg = fastest_leg.max(rate),
+                "HES" => fastest_chest = fastest_chest.max(rate),
                 _ => {}
             }
         }
     }
     assert!((fastest_arm - 0.2).abs() < 1e-9, "{fastest_arm}");
-    assert!(fastest_leg > 0.5, "{fastest_leg}");
+    assert!(fastest_leg > 0.5 && fastest_chest > 0.5, "{fastest_leg}, {fastest_chest}");
 }
 
 #[test]

@@ -284,8 +284,8 @@ mod tests {
             let (solution, set) = (program.solution, active);
             program.minimize(&mut active).unwrap();
             prop_assert_eq!(active, set);
-            for i in 0..9 {
-                prop_assert!((program.solution[i] - solution[i]).abs() < 1e-9);
+            for (again, first) in program.solution[..9].iter().zip(&solution) {
+                prop_assert!((again - first).abs() < 1e-9);
             }
         }
     }

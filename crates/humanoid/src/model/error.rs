@@ -6,8 +6,13 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LoadModelError {
     /// The text is not XML, or not URDF.
-    #[error("malformed URDF: {0}")]
-    Malformed(String),
+    #[error("malformed URDF: {place}: {reason}")]
+    Malformed {
+        /// Line and element, as far as they are known.
+        place: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// Two elements share a name.
     #[error("{element} '{name}' is described twice; names must be unique")]
     DuplicateName {

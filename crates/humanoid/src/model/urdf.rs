@@ -30,7 +30,7 @@ impl PackageTable {
 }
 
 pub(super) fn load(text: &str, find_mesh: &dyn Fn(&str) -> Option<PathBuf>) -> Result<Model, LoadModelError> {
-    let robot = urdf_rs::read_from_string(text).map_err(|e| LoadModelError::Malformed(e.to_string()))?;
+    let robot = parse(text)?;
     let tree = Tree::of(&robot)?;
 
     let mut builder = Builder { robot: &robot, find_mesh, bodies: vec![], joints: vec![], frames: vec![] };
@@ -51,6 +51,33 @@ pub(super) fn load(text: &str, find_mesh: &dyn Fn(&str) -> Option<PathBuf>) -> R
         return Err(LoadModelError::Loop { link: link.name.clone() });
     }
     builder.finish()
+}
+
+/// URDF as elements. The reader says what is wrong, but not where: a malformed element is found by
+/// reading each of them alone.
+fn parse(text: &str) -> Result<urdf_rs::Robot, LoadModelError> {
+    let malformed = |place: String, reason: String| Err(LoadModelError::Malformed { place, reason });
+    let document = match roxmltree::Document::parse(text) {
+        Ok(document) => document,
+        Err(error) => return malformed(format!("line {}", error.pos().row), error.to_string()),
+    };
+    let root = document.root_element();
+    if root.tag_name().name() != "robot" {
+        return malformed("root".into(), format!("<{}>; expected <robot>", root.tag_name().name()));
+    }
+    let error = match urdf_rs::read_from_string(text) {
+        Ok(robot) => return Ok(robot),
+        Err(error) => error,
+    };
+    for element in root.children().filter(roxmltree::Node::is_element) {
+        let alone = format!(r#"<robot name="">{}</robot>"#, &text[element.range()]);
+        if let Err(reason) = urdf_rs::read_from_string(&alone) {
+            let line = document.text_pos_at(element.range().start).row;
+            let (tag, name) = (element.tag_name().name(), element.attribute("name").unwrap_or("nameless"));
+            return malformed(format!("line {line}: {tag} '{name}'"), reason.to_string());
+        }
+    }
+    malformed("robot".into(), error.to_string())
 }
 
 /// Which joint hangs on which link.
