@@ -1,0 +1,16 @@
+//! `mikoshi-coordinator`: the team's controller as a process.
+
+use clap::Parser;
+use mikoshi_coordinator::CoordinatorParticipant;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_process::{ServeError, ServiceArguments, serve};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = ServiceArguments::parse();
+    serve(
+        &arguments.run,
+        |_| Ok(ServiceId::Coordinator),
+        |run, transport| CoordinatorParticipant::new(run, transport).map_err(ServeError::configuration),
+    )
+}

@@ -1,0 +1,102 @@
+//! What the main functions of all services share: arguments, the place in the run, rights, exit status.
+//!
+//! A service's own `main.rs` only says which service it is and how it is built.
+
+use clap::Parser;
+use core::fmt::Display;
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_resolution::{read_run, tick_schedule};
+use mikoshi_runtime::{
+    IceoryxTransport, Member, OnMissingRight, Participant, RealTime, Role, TickError, WaitPolicy, run_service,
+};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Arguments of a service of which a run has one.
+#[derive(Debug, Parser)]
+pub struct ServiceArguments {
+    /// Directory of the run, as its supervisor made it
+    #[arg(long, value_name = "DIR")]
+    pub run: PathBuf,
+}
+
+/// Arguments of a service of which every robot has one.
+#[derive(Debug, Parser)]
+pub struct RobotServiceArguments {
+    /// Directory of the run, as its supervisor made it
+    #[arg(long, value_name = "DIR")]
+    pub run: PathBuf,
+    /// Name of the robot
+    #[arg(long, value_name = "NAME")]
+    pub robot: String,
+}
+
+/// Exit statuses, as the `mikoshi` command documents them.
+const BAD_CONFIGURATION: u8 = 2;
+const SYSTEM_FAULT: u8 = 3;
+
+/// A service that can't take part, and the status that says so.
+#[derive(Debug)]
+pub struct ServeError {
+    status: u8,
+    message: String,
+}
+
+impl ServeError {
+    /// What was asked for can't be.
+    pub fn configuration(problem: impl Display) -> Self {
+        Self { status: BAD_CONFIGURATION, message: problem.to_string() }
+    }
+
+    /// The system does not let it.
+    pub fn fault(problem: impl Display) -> Self {
+        Self { status: SYSTEM_FAULT, message: problem.to_string() }
+    }
+}
+
+/// Runs a service of the run in directory `run` from its first tick to its last: `service` finds out
+/// which it is, `build` builds it on its ports.
+pub fn serve<P: Participant>(
+    run: &Path,
+    service: impl FnOnce(&RunSpec) -> Result<ServiceId, ServeError>,
+    build: impl FnOnce(&RunSpec, &IceoryxTransport) -> Result<P, ServeError>,
+) -> ExitCode {
+    match try_serve(run, service, build) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(ServeError { status, message }) => {
+            eprintln!("error: {message}");
+            ExitCode::from(status)
+        }
+    }
+}
+
+fn try_serve<P: Participant>(
+    directory: &Path,
+    service: impl FnOnce(&RunSpec) -> Result<ServiceId, ServeError>,
+    build: impl FnOnce(&RunSpec, &IceoryxTransport) -> Result<P, ServeError>,
+) -> Result<(), ServeError> {
+    let run = read_run(directory).map_err(ServeError::fault)?;
+    let schedule = tick_schedule(&run).map_err(ServeError::configuration)?;
+    let service = service(&run)?;
+    let core = schedule.phases_of(service).find_map(|phase| phase.core);
+    let real_time = RealTime {
+        core,
+        fifo_priority: run.scenario.placement.fifo_priority,
+        lock_memory: false,
+        on_missing_right: OnMissingRight::Warn,
+    };
+    for missing in real_time.apply().map_err(ServeError::fault)? {
+        eprintln!("warning: {missing}");
+    }
+    let member =
+        Member::join(directory, Role::Service(service), WaitPolicy::default()).map_err(ServeError::fault)?;
+    let transport = IceoryxTransport::open(directory, member, &schedule).map_err(ServeError::fault)?;
+    let mut participant = build(&run, &transport)?;
+    match run_service(&schedule, &mut participant, &transport, run.ticks) {
+        Ok(_) => Ok(()),
+        // Asked to stop is not a fault of this service.
+        Err(fault) if fault.error == TickError::Stopped => Ok(()),
+        Err(fault) => Err(ServeError::fault(fault)),
+    }
+}
