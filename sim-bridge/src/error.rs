@@ -55,12 +55,15 @@ pub enum BuildWorldError {
     Simulator(String),
 }
 
-/// A step whose result is not physics.
+/// A step that could not be made, or whose result is not physics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum StepWorldError {
     /// There is not one command for each robot.
     #[error("the number of joint commands is not the number of robots")]
     CommandCount,
+    /// A command is NaN or infinite.
+    #[error("a joint command is not finite")]
+    NotFinite,
     /// A position, velocity or acceleration became NaN, infinite or enormous.
     #[error("the simulated world diverged")]
     Diverged,

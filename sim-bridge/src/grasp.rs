@@ -69,7 +69,7 @@ impl Spring {
         let ratios = [damping_ns_m / object.mass_kg, damping_nms_rad / smallest_inertia];
         // An explicit damper is stable up to 2 and oscillates from 1 on.
         if let Some(ratio) =
-            ratios.map(|ratio| hands as f64 * step_s * ratio).into_iter().find(|&r| !(r < 0.5))
+            ratios.map(|ratio| hands as f64 * step_s * ratio).into_iter().find(|&r| r.is_nan() || r >= 0.5)
         {
             return Err(BuildWorldError::Inconsistent {
                 place: "[grasp]".to_owned(),

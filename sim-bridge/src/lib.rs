@@ -17,6 +17,7 @@ mod grasp;
 mod layout;
 mod logging;
 mod mjcf;
+mod participant;
 mod pose;
 mod random;
 mod readings;
@@ -27,6 +28,7 @@ mod truth;
 mod world;
 
 pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
+pub use participant::{BridgeParticipant, BuildBridgeError};
 pub use world::World;
 
 /// Standard gravity as the simulated world has it.

@@ -19,12 +19,9 @@ pub struct Draws(Pcg64);
 impl Draws {
     /// The draws of one robot for one purpose.
     pub fn new(seed: u64, purpose: Purpose, robot: usize) -> Self {
-        let mut bytes = [0; 32];
-        for (chunk, word) in bytes.chunks_exact_mut(8).zip([seed, !seed, purpose as u64, robot as u64]) {
-            chunk.copy_from_slice(&word.to_le_bytes());
-        }
-        // The first outputs of neighbouring seeds resemble each other: the rest is seeded by them.
-        let mut rough = Pcg64::from_seed(bytes);
+        // The first outputs of neighbouring states resemble each other: the generator proper is seeded
+        // by later ones.
+        let mut rough = Pcg64::new(u128::from(seed) << 64 | (purpose as u128) << 32 | robot as u128, 0);
         rough.advance(16);
         let mut seed = [0; 32];
         rough.fill_bytes(&mut seed);
@@ -32,7 +29,7 @@ impl Draws {
     }
 
     /// The same draws from place `place` on.
-    pub fn from_place(&self, place: u64) -> Self {
+    pub fn at_place(&self, place: u64) -> Self {
         let mut generator = self.0.clone();
         generator.advance(u128::from(place));
         Self(generator)
@@ -71,9 +68,9 @@ mod tests {
             assert!(all[..i].iter().all(|b| (a - b).abs() > 1e-3), "{all:?}");
         }
         let mut draws = Draws::new(0, Purpose::GraspOffset, 0);
-        let start = draws.from_place(0);
+        let start = draws.at_place(0);
         let drawn: Vec<f64> = (0..5).map(|_| draws.uniform()).collect();
-        assert_eq!(start.from_place(3).uniform(), drawn[3]);
+        assert_eq!(start.at_place(3).uniform(), drawn[3]);
     }
 
     #[test]

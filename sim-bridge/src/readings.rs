@@ -98,6 +98,6 @@ impl Noise {
     /// The draws of a tick: each tick has places of its own, so that nothing needs to be remembered.
     fn at(&self, tick: u64) -> Draws {
         let channels = self.joints + 6 * (self.hands + self.feet) + 6;
-        self.draws.from_place(tick.wrapping_mul(channels as u64 * PLACES_OF_NORMAL))
+        self.draws.at_place(tick.wrapping_mul(channels as u64 * PLACES_OF_NORMAL))
     }
 }

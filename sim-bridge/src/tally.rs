@@ -33,11 +33,6 @@ impl Tally {
         }
     }
 
-    /// Whether no step has been counted.
-    pub fn is_empty(&self) -> bool {
-        self.steps == 0
-    }
-
     /// Torque that a drive applied, averaged over the steps.
     pub fn mean_torque_nm(&self, joint: usize) -> f64 {
         self.torque_sum_nm[joint] / f64::from(self.steps.max(1))

@@ -53,18 +53,15 @@ pub fn of_robot(
 
 /// Centre of pressure of all ground contact, and its margin in the hull of the feet that bear.
 ///
-/// With the mean ground wrench (f, n) about the world's origin: p = (−n_y, n_x) / f_z. Without ground
-/// contact, as at tick 0 before the first physics step, that of the robot at rest: the ground point
-/// below its centre of mass, in the hull of all feet at tick 0, and with margin 0 where no foot bears.
+/// With the mean ground wrench (f, n) about the world's origin: p = (−n_y, n_x) / f_z. Where no foot
+/// bears, the ground point below the centre of mass, with margin 0.
 fn zero_moment_point(
     data: &MjData<Box<MjModel>>,
     layout: &RobotLayout,
     tally: &Tally,
     com: &[f64; 3],
 ) -> (Vector2<f64>, f64) {
-    let bears = |foot: usize| {
-        tally.is_empty() || tally.mean_ground_wrench(foot).force.z > BEARING_SHARE * layout.weight_n
-    };
+    let bears = |foot: usize| tally.mean_ground_wrench(foot).force.z > BEARING_SHARE * layout.weight_n;
     let ground = (0..layout.feet.len())
         .fold(Wrench::<World>::zero(), |sum, foot| sum + tally.mean_ground_wrench(foot));
     let point = if ground.force.z > BEARING_SHARE * layout.weight_n {

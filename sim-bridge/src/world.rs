@@ -51,11 +51,16 @@ struct Scratch {
     simulator_state: Box<[f64]>,
 }
 
+/// How long the world comes to rest before tick 0.
+const SETTLING_S: f64 = 1.0;
+
 /// All that the simulator integrates, warm start included: without it a replay differs in the last bits.
 const INTEGRATION: u32 = MjtState::mjSTATE_INTEGRATION as u32;
 
 impl World {
-    /// The world at tick 0, at rest, with the hands on the object.
+    /// The world at tick 0, with the hands on the object. It is put where the run says, and has come to
+    /// rest there: soles have sunk in, drives have given way, grasps strain. That moves palms and object
+    /// by millimetres.
     ///
     /// # Errors
     /// A run that no world can be built from; see [`BuildWorldError`].
@@ -112,11 +117,7 @@ impl World {
             simulator_state: vec![0.0; state_size].into(),
         };
         let mut world = Self { data, xml, layout, spring, noise, substeps, depth, state, scratch };
-        world.data.step1();
-        world.pull_by_springs();
-        world.data.forward();
-        world.read_hand_wrenches();
-        world.observe();
+        world.settle(scenario.physics.step_s)?;
         // Readings from before tick 0 are those of tick 0.
         for ring in world.state.readings.chunks_exact_mut(depth) {
             let first = ring[0];
@@ -167,10 +168,16 @@ impl World {
     /// in the last physics step; the rates feed the drives' damping forward.
     ///
     /// # Errors
-    /// The result is not physics. The world must not be used any more, except to be loaded.
+    /// Commands that cannot be followed leave the world as it is. After a result that is not physics the
+    /// world must not be used any more, except to be loaded.
     pub fn step(&mut self, commands: &[JointCommand]) -> Result<(), StepWorldError> {
         if commands.len() != self.robot_count() {
             return Err(StepWorldError::CommandCount);
+        }
+        let values =
+            commands.iter().flat_map(|c| c.joint_position_ref_rad.iter().chain(&c.joint_velocity_ref_rad_s));
+        if !values.into_iter().all(|value| value.is_finite()) {
+            return Err(StepWorldError::NotFinite);
         }
         self.scratch.tallies.fill(Tally::empty());
         self.scratch.unintended = Unintended::default();
@@ -250,6 +257,21 @@ impl World {
         if found == expected { Ok(()) } else { Err(LoadWorldError { found, expected }) }
     }
 
+    /// Lets the world come to rest before tick 0: drives give way under the weight, soles sink in,
+    /// grasps strain. A real team stands before it is asked to do anything.
+    fn settle(&mut self, step_s: f64) -> Result<(), BuildWorldError> {
+        self.data.step1();
+        let ticks = (SETTLING_S / (step_s * self.substeps as f64)).ceil() as u64;
+        let commands = self.state.commands.clone();
+        for _ in 0..ticks {
+            self.step(&commands).map_err(|error| BuildWorldError::Simulator(error.to_string()))?;
+        }
+        self.state.tick = 0;
+        self.data.set_time(0.0);
+        self.observe();
+        Ok(())
+    }
+
     /// The drives' references at `share` of the way from the last commands to these.
     fn set_drives(&mut self, commands: &[JointCommand], share: f64) {
         let ctrl = self.data.ctrl_mut();
@@ -322,10 +344,13 @@ impl World {
 
     fn check(&self) -> Result<(), StepWorldError> {
         let has_warned = |warning: MjtWarning| self.data.warning()[warning as usize].number > 0;
-        if [MjtWarning::mjWARN_BADQPOS, MjtWarning::mjWARN_BADQVEL, MjtWarning::mjWARN_BADQACC]
-            .into_iter()
-            .any(has_warned)
-        {
+        let not_physics = [
+            MjtWarning::mjWARN_BADQPOS,
+            MjtWarning::mjWARN_BADQVEL,
+            MjtWarning::mjWARN_BADQACC,
+            MjtWarning::mjWARN_BADCTRL,
+        ];
+        if not_physics.into_iter().any(has_warned) {
             return Err(StepWorldError::Diverged);
         }
         if [MjtWarning::mjWARN_CONTACTFULL, MjtWarning::mjWARN_CNSTRFULL].into_iter().any(has_warned) {

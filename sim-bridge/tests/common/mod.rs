@@ -1,13 +1,14 @@
 //! Teams that stand in the carry posture, made without the services that make them for a real run.
 
-#![allow(dead_code)] // Each test uses its part.
+#![allow(dead_code, non_snake_case)] // Each test uses its part; monogram names as in the crates.
 
-use mikoshi_config::load_scenario;
-use mikoshi_config::{RobotSpec, RunSpec};
+use bytemuck::Zeroable;
+use mikoshi_config::{RobotSpec, RunSpec, load_scenario};
 use mikoshi_humanoid::{Kinematics, Model};
-use mikoshi_ipc_types::{JointCommand, MAX_JOINTS};
+use mikoshi_ipc_types::{JointCommand, MAX_JOINTS, ObjectTruth, PoseWire, RobotTruth, Sensors, WrenchWire};
+use mikoshi_sim_bridge::World as SimulatedWorld;
 use mikoshi_spatial::{Base, Foot, Hand, Object, Pose, World};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
 /// Scenario `name` with these overrides, its robots in their configured carry posture.
@@ -71,4 +72,63 @@ pub fn constant_commands(run: &RunSpec) -> Vec<JointCommand> {
         command
     };
     run.robots.iter().map(command).collect()
+}
+
+/// Reads all that a world says at its tick.
+pub struct Seen {
+    pub sensors: Vec<Sensors>,
+    pub robots: Vec<RobotTruth>,
+    pub object: ObjectTruth,
+}
+
+/// All that `world` says at its tick.
+pub fn look(world: &SimulatedWorld) -> Seen {
+    let robots = world.robot_count();
+    let mut seen = Seen {
+        sensors: vec![Sensors::zeroed(); robots],
+        robots: vec![RobotTruth::zeroed(); robots],
+        object: ObjectTruth::zeroed(),
+    };
+    for (robot, (sensors, truth)) in seen.sensors.iter_mut().zip(&mut seen.robots).enumerate() {
+        world.sense(robot, sensors);
+        world.robot_truth(robot, truth);
+    }
+    world.object_truth(&mut seen.object);
+    seen
+}
+
+/// The bytes of everything, as a run's identity is made of.
+pub fn bytes_of(seen: &Seen) -> Vec<u8> {
+    let mut bytes = bytemuck::cast_slice(&seen.sensors).to_vec();
+    bytes.extend_from_slice(bytemuck::cast_slice(&seen.robots));
+    bytes.extend_from_slice(bytemuck::bytes_of(&seen.object));
+    bytes
+}
+
+/// Commands under which every joint of every robot swings about its posture, each at its own pace.
+pub fn swinging_commands(run: &RunSpec, time_s: f64, amplitude_rad: f64) -> Vec<JointCommand> {
+    let mut commands = constant_commands(run);
+    for (robot, command) in commands.iter_mut().enumerate() {
+        let joints = run.robots[robot].initial_posture_rad.len();
+        for joint in 0..joints {
+            let rate = 3.0 + 0.7 * joint as f64 + 0.3 * robot as f64;
+            command.joint_position_ref_rad[joint] += amplitude_rad * (rate * time_s).sin();
+            command.joint_velocity_ref_rad_s[joint] = amplitude_rad * rate * (rate * time_s).cos();
+        }
+    }
+    commands
+}
+
+/// Force and moment of a frame.
+pub fn wrench(wire: &WrenchWire) -> (Vector3<f64>, Vector3<f64>) {
+    (Vector3::from_column_slice(&wire[..3]), Vector3::from_column_slice(&wire[3..]))
+}
+
+/// A pose of a frame.
+pub fn pose(wire: &PoseWire) -> Isometry3<f64> {
+    let [x, y, z, qw, qx, qy, qz] = *wire;
+    Isometry3::from_parts(
+        Translation3::new(x, y, z),
+        UnitQuaternion::new_normalize(Quaternion::new(qw, qx, qy, qz)),
+    )
 }
