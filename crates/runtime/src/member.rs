@@ -114,7 +114,8 @@ impl Member {
             let all_met = self.board.slots().iter().all(|slot| match (slot.role(), slot.state()) {
                 (Some(Role::Service(_)), State::Failed) => false,
                 (Some(Role::Service(_)), other) => other >= state,
-                (Some(Role::Tap), other) => other == State::Absent || other >= state,
+                // It may stay when all services have gone: what they sent is still to be read.
+                (Some(Role::Tap), other) => state == State::Done || other == State::Absent || other >= state,
                 _ => true,
             });
             Ok(all_met.then_some(()))

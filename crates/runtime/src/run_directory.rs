@@ -16,6 +16,8 @@ use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+const LOCK: &str = "lock";
+
 /// Why a run has no directory.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {source}", path.display())]
@@ -31,6 +33,7 @@ pub struct RunDirectoryError {
 #[derive(Debug)]
 pub struct RunDirectory {
     path: PathBuf,
+    is_removed: bool,
     /// Locked; closing it unlocks it.
     _lock: File,
 }
@@ -62,7 +65,7 @@ impl RunDirectory {
             match DirBuilder::new().mode(0o700).create(&path) {
                 Ok(()) => {
                     let lock = lock(&path, FlockOperation::NonBlockingLockExclusive)?;
-                    return Ok(Self { path, _lock: lock });
+                    return Ok(Self { path, is_removed: false, _lock: lock });
                 }
                 // Left by a process that had our pid before, or another run of ours.
                 Err(source) if source.kind() == io::ErrorKind::AlreadyExists => {}
@@ -103,12 +106,14 @@ impl RunDirectory {
             return Ok(Vec::new());
         }
         // While it is held nobody makes a run, so that none is taken for dead which is half made.
-        let (base, _base_lock) = enter(base)?;
+        let (base, base_lock) = enter(base)?;
         let mut removed = Vec::new();
         for run in runs_in(&base)?.into_iter().filter(|run| !run.alive) {
             remove(&run.path).map_err(|source| RunDirectoryError { path: run.path.clone(), source })?;
             removed.push(run.path);
         }
+        drop(base_lock);
+        leave(&base)?;
         Ok(removed)
     }
 
@@ -116,15 +121,24 @@ impl RunDirectory {
     ///
     /// # Errors
     /// A file can't be removed.
-    pub fn remove(self) -> Result<(), RunDirectoryError> {
-        remove(&self.path).map_err(|source| RunDirectoryError { path: self.path.clone(), source })
+    pub fn remove(mut self) -> Result<(), RunDirectoryError> {
+        self.remove_all()
+    }
+
+    fn remove_all(&mut self) -> Result<(), RunDirectoryError> {
+        // Once only: its name may already be that of another run.
+        if core::mem::replace(&mut self.is_removed, true) {
+            return Ok(());
+        }
+        remove(&self.path).map_err(|source| RunDirectoryError { path: self.path.clone(), source })?;
+        self.path.parent().map_or(Ok(()), leave)
     }
 }
 
 impl Drop for RunDirectory {
     fn drop(&mut self) {
         // What can't be removed now is garbage, and cleaned at the next start.
-        let _ = remove(&self.path);
+        let _ = self.remove_all();
     }
 }
 
@@ -153,11 +167,30 @@ fn enter(base: &Path) -> Result<(PathBuf, File), RunDirectoryError> {
     }
     let base = base.canonicalize().map_err(error)?;
     let lock = lock(&base, FlockOperation::LockExclusive)?;
-    Ok((base, lock))
+    // Its last user may have removed it while we waited for the lock.
+    match std::fs::metadata(base.join(LOCK))
+        .is_ok_and(|file| lock.metadata().is_ok_and(|m| m.ino() == file.ino()))
+    {
+        true => Ok((base, lock)),
+        false => enter(&base),
+    }
+}
+
+/// Removes `base` if it is the usual one and no run is left in it.
+fn leave(base: &Path) -> Result<(), RunDirectoryError> {
+    if base != RunDirectory::default_base() {
+        return Ok(());
+    }
+    let (base, _base_lock) = enter(base)?;
+    if runs_in(&base)?.is_empty() {
+        // A file that somebody has put there keeps it.
+        let _ = std::fs::remove_file(base.join(LOCK)).and_then(|()| std::fs::remove_dir(&base));
+    }
+    Ok(())
 }
 
 fn lock(directory: &Path, operation: FlockOperation) -> Result<File, RunDirectoryError> {
-    let path = directory.join("lock");
+    let path = directory.join(LOCK);
     OpenOptions::new()
         .write(true)
         .create(true)
@@ -184,7 +217,7 @@ fn runs_in(base: &Path) -> Result<Vec<FoundRun>, RunDirectoryError> {
 
 /// A run lives while its supervisor holds the lock, or one of its processes still runs.
 fn is_alive(run: &Path) -> bool {
-    let is_locked = match File::open(run.join("lock")) {
+    let is_locked = match File::open(run.join(LOCK)) {
         Ok(file) => flock(&file, FlockOperation::NonBlockingLockShared).is_err(),
         Err(_) => false,
     };

@@ -64,6 +64,7 @@ impl Bed {
     /// Nothing is lost: the reason is written before the last poll, and a waker reads it after what it
     /// wakes for is visible. Both are separated by sequentially consistent fences, so that the sleeper
     /// sees the event or the waker sees the sleeper.
+    #[expect(clippy::disallowed_methods, reason = "how long to yield; no result depends on it")]
     pub(crate) fn wait<T, E>(
         &self,
         reason: Reason,

@@ -461,22 +461,6 @@ pub struct IceoryxObserver<P: Payload> {
     reason: Reason,
 }
 
-impl<P: Payload> IceoryxObserver<P> {
-    /// Waits for the next frame in order. None follows once all services have ended.
-    ///
-    /// # Errors
-    /// A process is lost or the run is to stop, and no frame is left.
-    pub fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
-        let process = Rc::clone(&self.process);
-        process.member.wait_for(self.reason, || {
-            // Asked first: what was published before the end is found after it.
-            let ended = process.member.all_services_have_ended();
-            let found = self.try_receive(frame)?;
-            Ok((found || ended).then_some(found))
-        })
-    }
-}
-
 impl<P: Payload> Observer<P> for IceoryxObserver<P> {
     fn try_receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
         let topic = self.topic;
@@ -488,5 +472,15 @@ impl<P: Payload> Observer<P> for IceoryxObserver<P> {
             return Err(TickError::WrongSchema { topic });
         }
         Ok(true)
+    }
+
+    fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
+        let process = Rc::clone(&self.process);
+        process.member.wait_for(self.reason, || {
+            // Asked first: what was published before the end is found after it.
+            let have_ended = process.member.all_services_have_ended();
+            let is_found = self.try_receive(frame)?;
+            Ok((is_found || have_ended).then_some(is_found))
+        })
     }
 }

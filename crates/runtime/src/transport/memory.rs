@@ -229,4 +229,8 @@ impl<P: Payload> Observer<P> for InMemoryObserver<P> {
         *frame = *next;
         Ok(true)
     }
+
+    fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
+        self.try_receive(frame)
+    }
 }

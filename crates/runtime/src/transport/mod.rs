@@ -119,6 +119,13 @@ pub trait Observer<P: Payload> {
     /// # Errors
     /// [`TickError::WrongSchema`], [`TickError::TransportFailed`].
     fn try_receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError>;
+
+    /// Waits for the next frame in order. There is none once all services have ended, or where nobody
+    /// could publish it meanwhile: in one thread.
+    ///
+    /// # Errors
+    /// As [`Observer::try_receive`]; a process is lost or the run is to stop, and no frame is left.
+    fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError>;
 }
 
 /// Why a port could not be made.
