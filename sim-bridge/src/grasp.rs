@@ -3,12 +3,12 @@
 use crate::BuildWorldError;
 use crate::layout::HandLayout;
 use crate::mjcf::{OBJECT, qualified};
-use crate::pose::{site_pose, site_velocity};
+use crate::pose::{site_pose, site_twist};
 use crate::random::{Draws, Purpose};
 use crate::robot::{Robot, isometry};
 use mikoshi_config::Scenario;
 use mikoshi_config::scenario::Grasp;
-use mikoshi_spatial::{World, Wrench, log};
+use mikoshi_spatial::{Hand, World, Wrench};
 use mujoco_rs::prelude::{MjData, MjModel};
 use nalgebra::{Isometry3, Translation3, Vector3};
 
@@ -88,16 +88,15 @@ impl Spring {
     /// `f = k (p_palm − p_site) + d (v_palm − v_object)`, both velocities at the palm's origin, and
     /// `n = k_r log(R_palm R_siteᵀ) + d_r (ω_palm − ω_object)`.
     pub fn wrench_on_object(&self, data: &MjData<Box<MjModel>>, hand: &HandLayout) -> Wrench<World> {
-        let (palm, site) = (site_pose(data, hand.palm_site), site_pose(data, hand.object_site));
-        let [v_palm, w_palm] = site_velocity(data, hand.palm_site);
-        let [v_site, w_site] = site_velocity(data, hand.object_site);
-        let stretch = palm.translation.vector - site.translation.vector;
+        let X_WH = site_pose::<Hand>(data, hand.palm_site);
+        let X_WG = site_pose::<Hand>(data, hand.object_site);
+        let stretch = X_WG.displacement_to(&X_WH);
         // The object's material at the palm's origin, so that the damper acts along one line.
-        let v_object = v_site + w_site.cross(&stretch);
+        let rate =
+            site_twist(data, hand.palm_site) - site_twist(data, hand.object_site).shifted(&stretch.linear);
         Wrench::new(
-            stretch * self.stiffness_n_m + (v_palm - v_object) * self.damping_ns_m,
-            log(&(palm.rotation * site.rotation.inverse())) * self.stiffness_nm_rad
-                + (w_palm - w_site) * self.damping_nms_rad,
+            stretch.linear * self.stiffness_n_m + rate.linear * self.damping_ns_m,
+            stretch.angular * self.stiffness_nm_rad + rate.angular * self.damping_nms_rad,
         )
     }
 }

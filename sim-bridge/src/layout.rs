@@ -4,9 +4,10 @@ use crate::BuildWorldError;
 use crate::grasp::GraspSite;
 use crate::mjcf::{self, FLOOR, OBJECT, qualified};
 use crate::robot::Robot;
+use mikoshi_humanoid::balance::PerFoot;
+use mikoshi_humanoid::estimate::SoleRectangle;
 use mikoshi_humanoid::model::FrameId;
 use mujoco_rs::prelude::{MjModel, MjtObjBase};
-use nalgebra::Vector2;
 
 /// The whole world's addresses.
 pub struct Layout {
@@ -33,6 +34,7 @@ pub struct RobotLayout {
     /// Grasping hands.
     pub hands: Vec<HandLayout>,
     pub feet: Vec<FootLayout>,
+    pub soles: PerFoot<SoleRectangle>,
     /// In the sensor data.
     pub gyro: usize,
     /// In the sensor data.
@@ -71,8 +73,6 @@ pub struct HandLayout {
 pub struct FootLayout {
     pub sensor: ForceTorqueLayout,
     pub sole_site: usize,
-    /// In the sole's frame.
-    pub corners: [Vector2<f64>; 4],
 }
 
 /// Whose a geom is.
@@ -160,15 +160,15 @@ impl Finder<'_> {
                 equality: self.0.name_to_id(MjtObjBase::mjOBJ_EQUALITY, &grasp.palm),
             })
         });
-        let feet = robot.feet.iter().zip(&robot.spec.config.feet).map(|(foot, config)| {
-            let [x_min, x_max, y_min, y_max] = config.sole_m;
-            let corners = [(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)];
-            Ok(FootLayout {
-                sensor: force_torque(foot.sensor)?,
-                sole_site: site(foot.frame)?,
-                corners: corners.map(|(x, y)| Vector2::new(x, y)),
-            })
-        });
+        let feet = robot
+            .feet
+            .iter()
+            .map(|foot| Ok(FootLayout { sensor: force_torque(foot.sensor)?, sole_site: site(foot.frame)? }));
+        let sole = |side| {
+            let foot = robot.spec.config.feet.get(side as usize);
+            let [x_min, x_max, y_min, y_max] = foot.map_or([0.0; 4], |foot| foot.sole_m);
+            SoleRectangle { x_min, x_max, y_min, y_max }
+        };
         let imu = mjcf::gyro_and_accelerometer(robot.name(), &model.frame(robot.imu).name);
         let [gyro, accelerometer] = self.sensor_pair(imu)?;
         Ok(RobotLayout {
@@ -178,6 +178,7 @@ impl Finder<'_> {
             joints: joints.collect::<Result<_, BuildWorldError>>()?,
             hands: hands.collect::<Result<_, BuildWorldError>>()?,
             feet: feet.collect::<Result<_, BuildWorldError>>()?,
+            soles: PerFoot::from_fn(sole),
             gyro,
             accelerometer,
         })

@@ -1,8 +1,8 @@
 //! The physical world: MuJoCo behind Mikoshi's frames.
 //!
 //! This crate knows physics, drives, sensors and contacts. It knows no control: what robots do is in
-//! their joint commands, and all that it shares with those who compute them is the description of the
-//! robots.
+//! their joint commands. With those who compute them it shares the robots' descriptions, and what a zero
+//! moment point and a support polygon are.
 //!
 //! # Glossary
 //! - **tick**: one period of control; **step**: one period of physics, several a tick.
@@ -11,6 +11,8 @@
 //!   hands is the i-th of them.
 //!
 //! [`RobotSpec::grasping_hands`]: mikoshi_config::RobotSpec::grasping_hands
+
+#![allow(non_snake_case)] // Monogram names, as in the crates of mathematics.
 
 mod error;
 mod grasp;
@@ -22,7 +24,6 @@ mod pose;
 mod random;
 mod readings;
 mod robot;
-mod support;
 mod tally;
 mod truth;
 mod world;

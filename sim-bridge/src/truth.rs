@@ -1,16 +1,19 @@
 //! The world as it truly is, for observers only.
 
 use crate::layout::{BodyLayout, HandLayout, Layout, RobotLayout};
-use crate::pose::{body_pose, free_body_twist, site_pose, wire};
-use crate::support;
+use crate::pose::{body_pose, body_twist, site_pose};
 use crate::tally::{Tally, Unintended};
+use mikoshi_humanoid::balance::PerFoot;
+use mikoshi_humanoid::estimate::{self, SupportPolygon};
 use mikoshi_ipc_types::{MAX_HANDS, ObjectTruth, RobotTruth};
-use mikoshi_spatial::{World, Wrench};
+use mikoshi_spatial::{Base, Foot, Hand, Object, World, Wrench};
 use mujoco_rs::prelude::{MjData, MjModel, MjtConstraint};
 use nalgebra::{Vector2, Vector3};
 
 /// Share of its weight that a foot must bear to count as a support.
 const BEARING_SHARE: f64 = 0.05;
+/// Margin of a robot that nothing supports: finite, as everything that travels.
+const NO_SUPPORT_M: f64 = -1.0;
 /// A robot whose base is tilted further has fallen.
 const FALLEN_TILT_RAD: f64 = 0.6;
 /// A robot whose base is lower than this share of its height at tick 0 has fallen.
@@ -24,19 +27,19 @@ pub fn of_robot(
     hand_wrenches: &[Wrench<World>; MAX_HANDS],
     truth: &mut RobotTruth,
 ) {
-    let base = body_pose(data, &layout.base);
-    truth.base_pose = wire(&base);
+    let X_WB = body_pose::<Base>(data, &layout.base);
+    truth.base_pose = X_WB.to_array();
     for (index, joint) in layout.joints.iter().enumerate() {
         truth.joint_position_rad[index] = data.qpos()[joint.qpos];
     }
     truth.joint_torque_peak_nm = tally.torque_peak_nm;
     truth.saturated_joints = tally.saturated_joints;
     for (index, hand) in layout.hands.iter().enumerate() {
-        truth.hand_pose[index] = wire(&site_pose(data, hand.palm_site));
+        truth.hand_pose[index] = site_pose::<Hand>(data, hand.palm_site).to_array();
         truth.hand_wrench[index] = hand_wrenches[index].to_array();
     }
     for (index, foot) in layout.feet.iter().enumerate() {
-        truth.sole_pose[index] = wire(&site_pose(data, foot.sole_site));
+        truth.sole_pose[index] = site_pose::<Foot>(data, foot.sole_site).to_array();
         truth.ground_wrench[index] = tally.mean_ground_wrench(index).to_array();
     }
     let com = data.subtree_com()[layout.base.body];
@@ -44,41 +47,33 @@ pub fn of_robot(
     let (zmp, margin) = zero_moment_point(data, layout, tally, &com);
     truth.zmp_position_m = zmp.into();
     truth.zmp_margin_m = margin;
-    truth.tilt_rad = (base.rotation * Vector3::z()).angle(&Vector3::z());
+    truth.tilt_rad = (X_WB.rotation * Vector3::z()).angle(&Vector3::z());
     let has_fallen = truth.tilt_rad > FALLEN_TILT_RAD
-        || base.translation.z < FALLEN_HEIGHT_SHARE * layout.initial_base_height_m
+        || X_WB.translation.z < FALLEN_HEIGHT_SHARE * layout.initial_base_height_m
         || tally.is_on_the_floor;
     truth.fallen |= u64::from(has_fallen);
 }
 
-/// Centre of pressure of all ground contact, and its margin in the hull of the feet that bear.
-///
-/// With the mean ground wrench (f, n) about the world's origin: p = (−n_y, n_x) / f_z. Where no foot
-/// bears, the ground point below the centre of mass, with margin 0.
+/// Centre of pressure of all ground contact on z = 0, and its distance from the edge of the hull of the
+/// feet that bear. Where none bears, the ground point below the centre of mass, and −1 m.
 fn zero_moment_point(
     data: &MjData<Box<MjModel>>,
     layout: &RobotLayout,
     tally: &Tally,
     com: &[f64; 3],
 ) -> (Vector2<f64>, f64) {
-    let bears = |foot: usize| tally.mean_ground_wrench(foot).force.z > BEARING_SHARE * layout.weight_n;
-    let ground = (0..layout.feet.len())
-        .fold(Wrench::<World>::zero(), |sum, foot| sum + tally.mean_ground_wrench(foot));
-    let point = if ground.force.z > BEARING_SHARE * layout.weight_n {
-        Vector2::new(-ground.moment.y, ground.moment.x) / ground.force.z
-    } else {
-        Vector2::new(com[0], com[1])
-    };
-    let mut corners = [Vector2::zeros(); support::MAX_CORNERS];
-    let mut count = 0;
-    for (_, foot) in layout.feet.iter().enumerate().filter(|(index, _)| bears(*index)) {
-        let sole = site_pose(data, foot.sole_site);
-        for (corner, in_sole) in corners[count..].iter_mut().zip(&foot.corners) {
-            *corner = sole.transform_point(&in_sole.push(0.0).into()).coords.xy();
-        }
-        count += foot.corners.len();
-    }
-    (point, support::margin(&mut corners[..count], &point).unwrap_or(0.0))
+    let least_force_n = BEARING_SHARE * layout.weight_n;
+    let feet = || layout.feet.iter().enumerate();
+    let ground = feet().fold(Wrench::zero(), |sum, (foot, _)| sum + tally.mean_ground_wrench(foot));
+    let point = estimate::zero_moment_point(&ground, 0.0, least_force_n)
+        .unwrap_or_else(|| Vector2::new(com[0], com[1]));
+    let standing = PerFoot::from_fn(|side| {
+        let (foot, layout) = feet().nth(side as usize)?;
+        let bears = tally.mean_ground_wrench(foot).force.z > least_force_n;
+        bears.then(|| site_pose(data, layout.sole_site))
+    });
+    let support = SupportPolygon::of_feet(&layout.soles, &standing);
+    (point, support.signed_distance(&point).max(NO_SUPPORT_M))
 }
 
 /// The object of now, and what touched what in the last tick.
@@ -88,8 +83,8 @@ pub fn of_object(
     unintended: &Unintended,
     truth: &mut ObjectTruth,
 ) {
-    truth.pose = wire(&body_pose(data, &layout.object));
-    truth.twist = free_body_twist(data, &layout.object).to_array();
+    truth.pose = body_pose::<Object>(data, &layout.object).to_array();
+    truth.twist = body_twist::<Object>(data, &layout.object).to_array();
     truth.unintended_contacts = unintended.count;
     truth.unintended_pair = unintended.first_pair;
     truth.robot_count = layout.robots.len() as u64;
@@ -127,8 +122,8 @@ pub unsafe fn weld_wrench(
         }
     }
     let [fx, fy, fz, nx, ny, nz] = generalized;
-    let pose = site_pose(data, hand.palm_site);
-    let object = body_pose(data, object);
-    Wrench::new(Vector3::new(fx, fy, fz), object.rotation * Vector3::new(nx, ny, nz))
-        .shifted(&(object.translation.vector - pose.translation.vector))
+    let X_WH = site_pose::<Hand>(data, hand.palm_site);
+    let X_WA = body_pose::<Object>(data, object);
+    Wrench::new(Vector3::new(fx, fy, fz), X_WA.rotation * Vector3::new(nx, ny, nz))
+        .shifted(&(X_WA.translation - X_WH.translation))
 }
