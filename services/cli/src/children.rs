@@ -48,21 +48,23 @@ pub struct Children {
 }
 
 impl Children {
-    /// Starts a service of the run in `run_directory`; what it says goes to a file in `logs`.
+    /// Starts a service of the run in `run_directory`, which people call `label`; what it says goes to a
+    /// file in `logs`.
     ///
     /// # Errors
     /// Its program is missing or can't be started.
     pub fn spawn(
         &mut self,
         service: ServiceId,
+        label: String,
         robot: Option<&str>,
         run_directory: &Path,
         logs: &Path,
     ) -> Result<(), Failure> {
         let program = binaries::find(binaries::name_of(service))?;
-        let (label, file_name) = match robot {
-            Some(robot) => (format!("servo of robot {robot}"), format!("servo-{robot}.log")),
-            None => (service.to_string(), format!("{service}.log")),
+        let file_name = match robot {
+            Some(robot) => format!("servo-{robot}.log"),
+            None => format!("{service}.log"),
         };
         let log = logs.join(file_name);
         let mut command = Command::new(&program);

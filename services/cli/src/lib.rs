@@ -45,14 +45,22 @@ pub fn main_of_command() -> ExitCode {
     })
 }
 
-/// `mikoshi-in-process` reads the same command line; `run` carries out what it asks for.
-pub fn main_of_in_process(run: impl FnOnce(&RunArguments) -> Result<Status, Failure>) -> ExitCode {
+/// `mikoshi-in-process` reads the same command line; `run` carries out what it asks for. Asked for its
+/// version, it says which simulator it has.
+pub fn main_of_in_process(
+    simulator: &str,
+    run: impl FnOnce(&RunArguments) -> Result<Status, Failure>,
+) -> ExitCode {
+    if env::args_os().skip(1).eq(["--version"]) {
+        print::print_out(&format!("{simulator}\n"));
+        return Status::Met.into();
+    }
     start_logging();
     conclude(match &Arguments::parse().command {
         Command::Run(arguments) => run(arguments),
         _ => Err(Failure {
             status: Status::Usage,
-            message: "this program only runs; use `mikoshi`".to_owned(),
+            message: "this program only runs scenarios in one thread: use `mikoshi`".to_owned(),
         }),
     })
 }

@@ -1,7 +1,11 @@
 //! How carrying out a run ended.
 
+use crate::binaries::kind_of;
 use crate::failure::Failure;
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::Fault;
+use mikoshi_runtime::RunFault;
 
 /// How carrying out a run ended.
 #[derive(Debug)]
@@ -17,4 +21,31 @@ pub enum Outcome {
         /// For scripts.
         faults: Vec<Fault>,
     },
+}
+
+impl Outcome {
+    /// The fault of one service.
+    pub fn of_run_fault(run: &RunSpec, fault: &RunFault) -> Self {
+        let RunFault { service, tick, error } = *fault;
+        Self::Fault {
+            failure: Failure::fault(format!("{} failed in tick {tick}: {error}", label_of(run, service))),
+            faults: vec![fault_of(run, service, tick, error.code().to_string())],
+        }
+    }
+}
+
+/// What people call a service: `bridge`, `servo of robot A`.
+pub(crate) fn label_of(run: &RunSpec, service: ServiceId) -> String {
+    robot_name(run, service).map_or_else(|| service.to_string(), |robot| format!("servo of robot {robot}"))
+}
+
+/// What summaries say of a fault.
+pub(crate) fn fault_of(run: &RunSpec, service: ServiceId, tick: u64, code: String) -> Fault {
+    let robot = robot_name(run, service).map(str::to_owned);
+    Fault { tick, service: kind_of(service).to_owned(), robot, code }
+}
+
+/// The name of the robot that a service controls.
+pub(crate) fn robot_name(run: &RunSpec, service: ServiceId) -> Option<&str> {
+    service.robot().and_then(|robot| run.robots.get(robot)).map(|robot| robot.member.name.as_str())
 }

@@ -6,12 +6,11 @@ use crate::children::{Children, Ended, ServiceProcess};
 use crate::failure::{Failure, Status};
 use crate::interrupts::Interrupts;
 use crate::observer::RunObserver;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, fault_of, label_of, robot_name};
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Fault, Observation, TeamTap};
 use mikoshi_resolution::write_run;
 use mikoshi_runtime::{
@@ -85,7 +84,7 @@ impl Supervisor {
         let tap = IceoryxTap::open(directory, join(Role::Tap)?, schedule).map_err(Failure::fault)?;
         let mut children = Children::default();
         for service in schedule.services() {
-            children.spawn(service, robot_name(run, service), directory, logs)?;
+            children.spawn(service, label_of(run, service), robot_name(run, service), directory, logs)?;
         }
         // While services set themselves up.
         let team_tap = TeamTap::new(&tap, run.robots.len()).map_err(Failure::fault)?;
@@ -175,7 +174,7 @@ impl Supervisor {
             return Outcome::Fault { failure, faults: vec![] };
         };
         let failed = self.children.processes().iter().filter(has_failed).filter_map(status_of);
-        let faults = failed.filter_map(|status| fault_of(run, status)).collect();
+        let faults = failed.filter_map(|status| fault_in(run, status)).collect();
         let failure = describe(cause, status_of(cause));
         Outcome::Fault { failure, faults }
     }
@@ -202,7 +201,12 @@ fn describe(process: &ServiceProcess, status: Option<&SlotStatus>) -> Failure {
     let exit = process.ended.map(|Ended { status, .. }| status);
     let code = exit.and_then(|exit| exit.code());
     let (mut exit_status, mut message) = (Status::Fault, process.label.clone());
-    match status.and_then(|status| status.fault.as_ref().map(|(_, text)| (status.tick, text))) {
+    // Who ends without a reason says so to the others, but not why: its last words do.
+    let reason = status.and_then(|status| {
+        let reason = status.fault.as_ref().filter(|(code, _)| *code != FaultCode::Aborted);
+        reason.map(|(_, text)| (status.tick, text))
+    });
+    match reason {
         Some((tick, text)) => message += &format!(" failed in tick {tick}: {text}"),
         // It refused the run before it took its place.
         None if code == Some(2) => {
@@ -230,27 +234,17 @@ fn stalled(run: &RunSpec, board: &[SlotStatus]) -> Outcome {
     let mut message = format!("no tick for {} s: a process is frozen, or too slow", STALL.as_secs());
     for status in board {
         if let Role::Service(service) = status.role {
-            let name = robot_name(run, service)
-                .map_or(service.to_string(), |robot| format!("servo of robot {robot}"));
+            let name = label_of(run, service);
             message += &format!("\n  {name}: {} in tick {}", status.state, status.tick);
         }
     }
     Outcome::Fault { failure: Failure { status: Status::Fault, message }, faults: vec![] }
 }
 
-fn fault_of(run: &RunSpec, status: &SlotStatus) -> Option<Fault> {
+fn fault_in(run: &RunSpec, status: &SlotStatus) -> Option<Fault> {
     let Role::Service(service) = status.role else { return None };
     let code = status.fault.as_ref().map_or("died".to_owned(), |(code, _)| code.to_string());
-    Some(Fault {
-        tick: status.tick,
-        service: binaries::kind_of(service).to_owned(),
-        robot: robot_name(run, service).map(str::to_owned),
-        code,
-    })
-}
-
-fn robot_name(run: &RunSpec, service: ServiceId) -> Option<&str> {
-    service.robot().and_then(|robot| run.robots.get(robot)).map(|robot| robot.member.name.as_str())
+    Some(fault_of(run, service, status.tick, code))
 }
 
 /// A run that went well leaves no empty files.

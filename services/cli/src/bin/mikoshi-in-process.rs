@@ -1,0 +1,70 @@
+//! `mikoshi-in-process`: all services of a run in one thread. `mikoshi run --in-process` becomes it.
+
+use core::ops::ControlFlow;
+use mikoshi::arguments::RunArguments;
+use mikoshi::commands::run::run;
+use mikoshi::failure::{Failure, Status};
+use mikoshi::interrupts::Interrupts;
+use mikoshi::observer::RunObserver;
+use mikoshi::outcome::Outcome;
+use mikoshi::prepare::Prepared;
+use mikoshi_coordinator::CoordinatorParticipant;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_observation::{Observation, TeamTap};
+use mikoshi_runtime::{InMemoryHub, Participant, run_in_one_thread};
+use mikoshi_servo::ServoParticipant;
+use mikoshi_sim_bridge::BridgeParticipant;
+use mujoco_rs::mujoco_version;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    mikoshi::main_of_in_process(&format!("MuJoCo {}", mujoco_version()), run_in_process)
+}
+
+fn run_in_process(arguments: &RunArguments) -> Result<Status, Failure> {
+    run(arguments, |prepared, _, observer| execute(prepared, observer))
+}
+
+fn execute(prepared: &Prepared, observer: &mut RunObserver) -> Result<Outcome, Failure> {
+    let interrupts = Interrupts::listen().map_err(Failure::fault)?;
+    let (run, hub) = (&prepared.run, InMemoryHub::new(prepared.schedule.clone()));
+    let mut team_tap = TeamTap::new(&hub.tap(), run.robots.len()).map_err(Failure::fault)?;
+    let mut participants = participants(prepared, &hub)?;
+    let mut observation = Observation::for_team(run.robots.len());
+
+    let mut early_end = None;
+    let ended = run_in_one_thread(&prepared.schedule, &mut participants, run.ticks, |_| {
+        let observed = match team_tap.try_take_tick(&mut observation) {
+            Ok(true) => observer.observe(&observation).map_err(Failure::fault),
+            Ok(false) => Err(Failure::fault("a tick without all of its frames")),
+            Err(error) => Err(Failure::fault(error)),
+        };
+        early_end = match (observed, interrupts.received()) {
+            (Err(failure), _) => Some(Outcome::Fault { failure, faults: vec![] }),
+            (Ok(()), signal) => signal.map(Outcome::Interrupted),
+        };
+        if early_end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    Ok(match (ended, early_end) {
+        (Err(fault), _) => Outcome::of_run_fault(run, &fault),
+        (Ok(_), Some(outcome)) => outcome,
+        (Ok(_), None) => Outcome::Completed,
+    })
+}
+
+fn participants(prepared: &Prepared, hub: &InMemoryHub) -> Result<Vec<Box<dyn Participant>>, Failure> {
+    let run = &prepared.run;
+    let build = |service: ServiceId| -> Result<Box<dyn Participant>, Failure> {
+        let transport = hub.transport(service);
+        Ok(match service {
+            ServiceId::Bridge => Box::new(BridgeParticipant::new(run, &transport).map_err(Failure::usage)?),
+            ServiceId::Coordinator => {
+                Box::new(CoordinatorParticipant::new(run, &transport).map_err(Failure::usage)?)
+            }
+            ServiceId::Servo(robot) => {
+                Box::new(ServoParticipant::new(run, robot, &transport).map_err(Failure::usage)?)
+            }
+        })
+    };
+    prepared.schedule.services().into_iter().map(build).collect()
+}
