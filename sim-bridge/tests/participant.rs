@@ -1,0 +1,109 @@
+//! The bridge as others see it: what it publishes, what it waits for, and which inputs end a run.
+
+mod common;
+
+use common::{bytes_of, constant_commands, look, standing_team};
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::{Frame, JointCommand, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId};
+use mikoshi_runtime::{
+    Call, InMemoryHub, InMemoryTransport, Loan, Observer, Participant, Placement, Publisher, Tap, TickError,
+    TickSchedule, Transport,
+};
+use mikoshi_sim_bridge::{BridgeParticipant, World};
+
+type Port<P> = <InMemoryTransport as Transport>::Publisher<P>;
+
+/// A bridge, and what the servos of its team publish with.
+struct Scene {
+    run: RunSpec,
+    hub: InMemoryHub,
+    bridge: BridgeParticipant<InMemoryTransport>,
+    servos: Vec<Port<JointCommand>>,
+}
+
+impl Scene {
+    fn new() -> Self {
+        let run = standing_team("hold", &[("team", "two")]);
+        let schedule = TickSchedule::of_team(2, 0, &Placement::default()).expect("a schedule");
+        let hub = InMemoryHub::new(schedule);
+        let bridge = BridgeParticipant::new(&run, &hub.transport(ServiceId::Bridge)).expect("a bridge");
+        let servos = (0..2).map(|r| hub.transport(ServiceId::Servo(r)).publisher(r).expect("a port"));
+        Self { servos: servos.collect(), run, hub, bridge }
+    }
+
+    fn command(&mut self, robot: usize, tick: u64, command: JointCommand) {
+        let mut loan = self.servos[robot].loan(tick).expect("room");
+        *loan.payload_mut() = command;
+        loan.send().expect("a working transport");
+    }
+}
+
+/// The payload that `observer` sees next.
+fn next<P: Payload>(observer: &mut impl Observer<P>) -> P {
+    let mut frame = Frame::zeroed();
+    assert!(observer.try_receive(&mut frame).expect("a readable frame"));
+    frame.payload
+}
+
+#[test]
+fn a_bridge_publishes_its_world_and_steps_it_by_all_commands() {
+    let mut scene = Scene::new();
+    let mut world = World::new(&scene.run).expect("a world");
+    let tap = scene.hub.tap();
+    let mut sensors = [0, 1].map(|r| tap.observer::<Sensors>(r).expect("an observer"));
+    let mut robots = [0, 1].map(|r| tap.observer::<RobotTruth>(r).expect("an observer"));
+    let mut object = tap.observer::<ObjectTruth>(0).expect("an observer");
+    let commands = constant_commands(&scene.run);
+    for tick in 0..5 {
+        scene.bridge.execute(Call::Publish, tick).expect("a tick");
+        let seen = common::Seen {
+            sensors: sensors.iter_mut().map(next).collect(),
+            robots: robots.iter_mut().map(next).collect(),
+            object: next(&mut object),
+        };
+        assert!(bytes_of(&seen) == bytes_of(&look(&world)));
+        for (robot, command) in commands.iter().enumerate() {
+            scene.command(robot, tick, *command);
+        }
+        scene.bridge.execute(Call::Step, tick).expect("a tick");
+        world.step(&commands).expect("physics");
+    }
+    assert_eq!(scene.bridge.world().tick(), 5);
+}
+
+#[test]
+fn a_robot_that_stalls_or_sends_nan_or_an_old_frame_ends_the_run_before_physics() {
+    let silent = |scene: &mut Scene, _: JointCommand| {
+        let _ = scene;
+    };
+    let nan = |scene: &mut Scene, mut command: JointCommand| {
+        command.joint_position_ref_rad[3] = f64::NAN;
+        scene.command(1, 0, command);
+    };
+    let future = |scene: &mut Scene, command: JointCommand| scene.command(1, 7, command);
+    let faults: [(&str, &dyn Fn(&mut Scene, JointCommand)); 3] =
+        [("silent", &silent), ("nan", &nan), ("future", &future)];
+    for (name, fault) in faults {
+        let mut scene = Scene::new();
+        let command = constant_commands(&scene.run)[0];
+        scene.bridge.execute(Call::Publish, 0).expect("a tick");
+        scene.command(0, 0, command);
+        fault(&mut scene, command);
+        let error = scene.bridge.execute(Call::Step, 0).expect_err(name);
+        let is_expected = match name {
+            "silent" => matches!(error, TickError::InputMissing { tick: 0, .. }),
+            "nan" => matches!(error, TickError::NotFinite { field: "joint_position_ref_rad", .. }),
+            _ => matches!(error, TickError::FutureTick { expected: 0, found: 7, .. }),
+        };
+        assert!(is_expected, "{name}: {error}");
+        assert_eq!(scene.bridge.world().tick(), 0);
+    }
+}
+
+#[test]
+fn a_bridge_has_no_other_calls_and_does_not_skip_ticks() {
+    let mut scene = Scene::new();
+    assert_eq!(scene.bridge.execute(Call::Act, 0), Err(TickError::UnknownCall));
+    assert!(matches!(scene.bridge.execute(Call::Publish, 1), Err(TickError::Service(_))));
+    assert_eq!(scene.bridge.id(), ServiceId::Bridge);
+}
