@@ -12,7 +12,7 @@ const WALKER: StepWish =
     StepWish { wants_step: true, can_stop: false, ready: true, first_swing: Side::Left, urgency: 1.5 };
 
 fn stepping(step_index: u64, tick_in_step: u64, will_continue: bool) -> StepClock {
-    let swing = if step_index % 2 == 0 { Side::Left } else { Side::Right };
+    let swing = if step_index.is_multiple_of(2) { Side::Left } else { Side::Right };
     StepClock::Stepping { step_index, tick_in_step, swing, will_continue }
 }
 

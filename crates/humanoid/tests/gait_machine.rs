@@ -40,7 +40,7 @@ fn next(phase: GaitPhase, clock: StepClock) -> GaitPhase {
 
 /// Left swings in even steps.
 fn stepping(step_index: u64, tick_in_step: u64) -> StepClock {
-    let swing = if step_index % 2 == 0 { Side::Left } else { Side::Right };
+    let swing = if step_index.is_multiple_of(2) { Side::Left } else { Side::Right };
     StepClock::Stepping { step_index, tick_in_step, swing, will_continue: true }
 }
 
@@ -48,7 +48,7 @@ const FINISHING: StepClock = StepClock::Finishing { tick: 3 };
 const STANDING: GaitPhase = GaitPhase::Standing { zmp: ZMP };
 
 fn step(index: u64) -> PlannedStep {
-    let side = if index % 2 == 0 { Side::Left } else { Side::Right };
+    let side = if index.is_multiple_of(2) { Side::Left } else { Side::Right };
     PlannedStep { index, side, to: GroundPose::new(0.1, 0.1, 0.0) }
 }
 

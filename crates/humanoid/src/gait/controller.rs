@@ -59,7 +59,7 @@ impl GaitConfig {
             }),
             mirrored: false,
             reference_lead_s: 0.4,
-            load_filter_s: 0.5,
+            load_filter_s: 1.0,
         }
     }
 }

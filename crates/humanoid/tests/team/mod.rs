@@ -73,12 +73,15 @@ impl Robot {
     }
 
     pub fn act(&mut self, clock: StepClock) -> GaitReference {
+        self.act_under(clock, ExternalLoad::NONE)
+    }
+
+    pub fn act_under(&mut self, clock: StepClock, load: ExternalLoad) -> GaitReference {
         let reference = self.gait.reference(&self.state);
         let foot_force = PerFoot::from_fn(|side| {
             if reference.feet[side].pose.translation.z <= self.ground_height + 1e-6 { 275.0 } else { 0.0 }
         });
-        let inputs =
-            GaitInputs { clock, hand_centre: Some(self.centre), foot_force, load: ExternalLoad::NONE };
+        let inputs = GaitInputs { clock, hand_centre: Some(self.centre), foot_force, load };
         self.gait.act(&mut self.state, &inputs)
     }
 }

@@ -1,0 +1,259 @@
+//! The stabiliser: from what the centre of mass does to what the feet of a position-controlled robot do
+//! about it.
+//!
+//! Sources: Kajita et al., IROS 2010 (linear inverted pendulum tracking); Caron et al., "Stair Climbing
+//! Stabilization of the HRP-4 Humanoid Robot using Whole-body Admittance Control", ICRA 2019; with hand
+//! loads as in Murooka et al., RA-L 2021.
+
+use super::distribution::{FootLoad, distribute};
+use super::nearest::nearest_in_polygon;
+use super::{ExternalLoad, Pendulum, PerFoot, Side};
+use crate::estimate::{SoleRectangle, SupportPolygon};
+use mikoshi_spatial::{Foot, Pose, Twist, World, Wrench};
+use nalgebra::{Vector2, Vector3};
+
+/// Everything that is constant over a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StabiliserConfig {
+    /// Control period \[s\].
+    pub control_period_s: f64,
+    /// Mass and height of the robot.
+    pub pendulum: Pendulum,
+    /// Soles in their feet's frames.
+    pub soles: PerFoot<SoleRectangle>,
+    /// Where under each foot the zero moment point rests, in the foot's frame \[m\]: the gait's.
+    pub zmp_in_foot: PerFoot<Vector2<f64>>,
+    /// kp: metres of zero moment point per metre of divergent component; stable above 1.
+    pub dcm_gain: f64,
+    /// ki \[1/s\].
+    pub dcm_integral_gain_1_s: f64,
+    /// Bound of the integral's part of the zero moment point \[m\].
+    pub dcm_integral_max_m: f64,
+    /// Time in which integral and offsets forget \[s\].
+    pub leak_s: f64,
+    /// Distance that the desired zero moment point keeps from the soles' edges \[m\].
+    pub sole_margin_m: f64,
+    /// Ankle admittance.
+    pub ankle_rad_s_nm: f64,
+    /// Largest tilt of a sole \[rad\].
+    pub ankle_max_rad: f64,
+    /// Admittance of the force difference between the feet.
+    pub force_difference_m_s_n: f64,
+    /// Largest difference of the feet's heights \[m\].
+    pub height_difference_max_m: f64,
+    /// Acceleration of the centre of mass per metre that the measured zero moment point lies past the
+    /// desired one \[1/s²\]; 0 leaves the gait's centre of mass alone.
+    pub com_admittance_1_s2: f64,
+    /// Largest offset of the centre of mass \[m\].
+    pub com_offset_max_m: f64,
+}
+
+impl StabiliserConfig {
+    /// Parameters that work for HRP-2's stiff drives.
+    pub fn standard(
+        control_period_s: f64,
+        pendulum: Pendulum,
+        soles: PerFoot<SoleRectangle>,
+        zmp_in_foot: PerFoot<Vector2<f64>>,
+    ) -> Self {
+        Self {
+            control_period_s,
+            pendulum,
+            soles,
+            zmp_in_foot,
+            dcm_gain: 2.0,
+            dcm_integral_gain_1_s: 1.0,
+            dcm_integral_max_m: 0.03,
+            leak_s: 1.0,
+            sole_margin_m: 0.01,
+            ankle_rad_s_nm: 1e-3,
+            ankle_max_rad: 0.15,
+            force_difference_m_s_n: 3e-5,
+            height_difference_max_m: 0.03,
+            com_admittance_1_s2: 0.0,
+            com_offset_max_m: 0.03,
+        }
+    }
+}
+
+/// All that matters from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StabiliserState {
+    /// Leaky integral of the divergent component's error \[m s, world\].
+    pub dcm_error_integral: Vector2<f64>,
+    /// Tilt of each sole about its own x and y axes \[rad\].
+    pub sole_tilt: PerFoot<Vector2<f64>>,
+    /// Height of the left sole over the right one \[m\].
+    pub height_difference: f64,
+    /// Offset of the centre of mass \[m, world\].
+    pub com_offset: Vector2<f64>,
+    /// Its velocity \[m/s\].
+    pub com_offset_velocity: Vector2<f64>,
+}
+
+/// What one tick takes; all in the world, at the start of the tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StabiliserInputs {
+    /// Centre of mass of the gait \[m\].
+    pub com_ref: Vector2<f64>,
+    /// Its velocity \[m/s\].
+    pub com_velocity_ref: Vector2<f64>,
+    /// Its acceleration \[m/s²\].
+    pub com_acceleration_ref: Vector2<f64>,
+    /// Measured centre of mass \[m\].
+    pub com: Vector2<f64>,
+    /// Its velocity \[m/s\].
+    pub com_velocity: Vector2<f64>,
+    /// Where each foot stands; `None` in the air.
+    pub standing: PerFoot<Option<Pose<World, Foot>>>,
+    /// Measured wrench of the ground on each foot, at the foot's origin.
+    pub ground_wrench: PerFoot<Wrench<World>>,
+    /// The measured hands' load.
+    pub load: ExternalLoad,
+}
+
+/// What the feet and the centre of mass shall do beside the gait, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stabilisation {
+    /// Zero moment point on the ground that would bring the divergent component back, within the support
+    /// \[m\].
+    pub zmp: Vector2<f64>,
+    /// Error of the divergent component, measured minus reference \[m\].
+    pub dcm_error: Vector2<f64>,
+    /// What each foot shall bear.
+    pub loads: PerFoot<FootLoad>,
+    /// How each sole is to be displaced: height, and tilt about its own horizontal axes.
+    pub sole_offset: PerFoot<Twist<Foot>>,
+    /// To be added to the gait's centre of mass \[m\].
+    pub com_offset: Vector2<f64>,
+}
+
+impl Stabilisation {
+    /// A foot's reference pose with its sole's offset.
+    pub fn apply(&self, side: Side, reference: &Pose<World, Foot>) -> Pose<World, Foot> {
+        let offset = &self.sole_offset[side];
+        *reference * Pose::<Foot, Foot>::identity().displaced(offset)
+    }
+}
+
+/// The stabiliser of one robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stabiliser {
+    config: StabiliserConfig,
+    inner_soles: PerFoot<SoleRectangle>,
+}
+
+impl Stabiliser {
+    /// For these parameters.
+    pub fn new(config: StabiliserConfig) -> Self {
+        let margin = config.sole_margin_m;
+        let inner_soles = PerFoot::from_fn(|side| {
+            let sole = config.soles[side];
+            SoleRectangle {
+                x_min: sole.x_min + margin,
+                x_max: sole.x_max - margin,
+                y_min: sole.y_min + margin,
+                y_max: sole.y_max - margin,
+            }
+        });
+        Self { config, inner_soles }
+    }
+
+    /// Its parameters.
+    pub fn config(&self) -> &StabiliserConfig {
+        &self.config
+    }
+
+    /// One tick.
+    ///
+    /// 1. Divergent component: ξ = c + ċ / ω, error e = ξ − ξ_ref; extended zero moment point
+    ///    `c_ref − c̈_ref / ω² + kp e + ki ∫e`, with which ξ̇ = ω (ξ − ·) makes ė = ω (1 − kp) e − …
+    /// 2. On the ground by the measured load of the hands ([`ExternalLoad`]), into the support.
+    /// 3. To the feet ([`distribute`]).
+    /// 4. Ankle admittance, in the foot's axes: `d(tilt)/dt = A (τ − τ_desired) − tilt / leak`: a sole
+    ///    yields to the ground's moment and so brings it to what is desired.
+    /// 5. Force difference: `d(h)/dt = A ((f_L − f_R) − desired) − h / leak`, h the left sole's height
+    ///    over the right one's, half of it to each: the foot that bears too much is drawn up.
+    /// 6. Admittance of the centre of mass to the error of the zero moment point (off by default).
+    ///
+    /// Where nothing stands, everything leaks.
+    pub fn act(&self, state: &mut StabiliserState, inputs: &StabiliserInputs) -> Stabilisation {
+        let config = &self.config;
+        let dt = config.control_period_s;
+        let pendulum = &config.pendulum;
+        let dcm_error = pendulum.divergent_component(&inputs.com, &inputs.com_velocity)
+            - pendulum.divergent_component(&inputs.com_ref, &inputs.com_velocity_ref);
+
+        let support = SupportPolygon::of_feet(&self.inner_soles, &inputs.standing);
+        let integral = &mut state.dcm_error_integral;
+        let stands = !support.vertices().is_empty();
+        let learned = if stands { dcm_error } else { Vector2::zeros() };
+        *integral += (learned - *integral / config.leak_s) * dt;
+        let integral_max = config.dcm_integral_max_m / config.dcm_integral_gain_1_s.max(1e-9);
+        *integral = integral.map(|value| value.clamp(-integral_max, integral_max));
+
+        let extended = pendulum.extended_zmp(&inputs.com_ref, &inputs.com_acceleration_ref)
+            + dcm_error * config.dcm_gain
+            + *integral * config.dcm_integral_gain_1_s;
+        let wished = inputs.load.ground_zmp(&extended);
+        let zmp = nearest_in_polygon(&support, &wished).unwrap_or(wished);
+        let force = pendulum.weight_n() * inputs.load.kappa;
+        let loads = distribute(force, &zmp, &self.inner_soles, &config.zmp_in_foot, &inputs.standing);
+
+        for side in Side::BOTH {
+            let tilt = &mut state.sole_tilt[side];
+            let mut rate = -*tilt / config.leak_s;
+            if let Some(foot) = &inputs.standing[side] {
+                let excess =
+                    inputs.ground_wrench[side].moment.xy() - loads[side].moment_about(&foot.translation.xy());
+                rate += (foot.rotation.inverse() * excess.push(0.0)).xy() * config.ankle_rad_s_nm;
+            }
+            *tilt = (*tilt + rate * dt).map(|value| value.clamp(-config.ankle_max_rad, config.ankle_max_rad));
+        }
+
+        let mut rate = -state.height_difference / config.leak_s;
+        if inputs.standing.right.is_some() && inputs.standing.left.is_some() {
+            let measured = inputs.ground_wrench.left.force.z - inputs.ground_wrench.right.force.z;
+            rate += config.force_difference_m_s_n * (measured - (loads.left.force - loads.right.force));
+        }
+        let most = config.height_difference_max_m;
+        state.height_difference = (state.height_difference + rate * dt).clamp(-most, most);
+
+        self.yield_with_com(state, inputs, &zmp);
+        let sole_offset = PerFoot::from_fn(|side| {
+            let tilt = state.sole_tilt[side];
+            let height = side.sign() * state.height_difference / 2.0;
+            Twist::new(Vector3::new(0.0, 0.0, height), Vector3::new(tilt.x, tilt.y, 0.0))
+        });
+        Stabilisation { zmp, dcm_error, loads, sole_offset, com_offset: state.com_offset }
+    }
+
+    /// c̈_offset = A (z_measured − z_desired), with a critically damped return within the leak.
+    fn yield_with_com(&self, state: &mut StabiliserState, inputs: &StabiliserInputs, zmp: &Vector2<f64>) {
+        let config = &self.config;
+        let (mut force, mut moment) = (0.0, Vector2::zeros());
+        for side in Side::BOTH {
+            let Some(foot) = &inputs.standing[side] else { continue };
+            let wrench = &inputs.ground_wrench[side];
+            force += wrench.force.z;
+            moment +=
+                foot.translation.xy() * wrench.force.z + Vector2::new(-wrench.moment.y, wrench.moment.x);
+        }
+        let stands = force > 0.1 * config.pendulum.weight_n();
+        let excess = if stands { moment / force - zmp } else { Vector2::zeros() };
+        let rate = 1.0 / config.leak_s;
+        let acceleration = excess * config.com_admittance_1_s2
+            - state.com_offset_velocity * (2.0 * rate)
+            - state.com_offset * (rate * rate);
+        let most = config.com_offset_max_m;
+        state.com_offset_velocity += acceleration * config.control_period_s;
+        let next = state.com_offset + state.com_offset_velocity * config.control_period_s;
+        state.com_offset = next.map(|value| value.clamp(-most, most));
+        // At its bound an offset has no speed outwards.
+        for axis in 0..2 {
+            if state.com_offset[axis] != next[axis] {
+                state.com_offset_velocity[axis] = 0.0;
+            }
+        }
+    }
+}
