@@ -6,8 +6,8 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
 /// Attitude change \[rad\] below which the mean of the tips counts as found.
 const MEAN_TOLERANCE_RAD: f64 = 1e-13;
-/// The mean converges with the square of the tips' spread: two or three rounds for tips that belong to one
-/// object. The bound is for those that don't.
+/// A round leaves a share of the error that is the square of the tips' spread \[rad\] over twelve: two or
+/// three rounds do for tips that belong to one object. The bound is for those that don't.
 const MEAN_ROUNDS: usize = 8;
 
 /// Buffers for n arms. Nothing in them outlives a call.
@@ -118,23 +118,15 @@ pub(crate) fn nan_pose<A: CoordinateFrame, B: CoordinateFrame>() -> Pose<A, B> {
 /// The weighted mean of the tips, and each tip's displacement from it in world axes.
 ///
 /// The mean attitude R solves `Σ wᵢ log(Rᵢ Rᵀ) = 0`: eq. 27 with rotation vectors about R. (Deviation:
-/// the paper averages Euler angles.) The normalised sum of quaternions starts it, right to third order in
-/// the spread.
+/// the paper averages Euler angles.)
 fn mean_pose(
     weights: &[f64],
     tips: &[Pose<World, Tip>],
     deviations: &mut [Twist<World>],
 ) -> Pose<World, Object> {
-    let Some(first) = tips.first() else { return Pose::identity() };
-    let mut position = Vector3::zeros();
-    let mut sum = Quaternion::new(0.0, 0.0, 0.0, 0.0);
-    for (weight, tip) in weights.iter().zip(tips) {
-        position += tip.translation * *weight;
-        // q and −q are the same attitude.
-        let same_side = if tip.rotation.coords.dot(&first.rotation.coords) < 0.0 { -1.0 } else { 1.0 };
-        sum += tip.rotation.into_inner() * (weight * same_side);
-    }
-    let mut attitude = UnitQuaternion::try_new(sum, 1e-3).unwrap_or(first.rotation);
+    let position: Vector3<f64> =
+        weights.iter().zip(tips).map(|(weight, tip)| tip.translation * *weight).sum();
+    let mut attitude = tips.first().map_or_else(UnitQuaternion::identity, |tip| tip.rotation);
     for round in 1..=MEAN_ROUNDS {
         let mut correction = Vector3::zeros();
         for ((weight, tip), deviation) in weights.iter().zip(tips).zip(deviations.iter_mut()) {

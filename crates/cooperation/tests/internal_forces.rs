@@ -209,9 +209,9 @@ fn a_dependent_row_is_named_with_those_that_determine_it() {
     let mut named: Vec<usize> = combination.iter().map(|(row, _)| *row).chain([*row]).collect();
     named.sort_unstable();
     assert_eq!(named, [1, 2, 3]);
-    for arm in 0..4 {
+    for (arm, dependent) in c[row - 1].iter().enumerate() {
         let sum: f64 = combination.iter().map(|(other, coefficient)| coefficient * c[other - 1][arm]).sum();
-        assert!((sum - c[row - 1][arm]).abs() < 1e-12);
+        assert!((sum - dependent).abs() < 1e-12);
     }
     // r3 = 2 r1 + r2, solved for whichever row the factorisation left over.
     let solved = ["r1 = -0.5 r2 + 0.5 r3", "r2 = -2 r1 + 1 r3", "r3 = 2 r1 + 1 r2"];

@@ -50,12 +50,10 @@ fn inverse(mut m: Vec<Vec<Rational>>) -> Vec<Vec<Rational>> {
         m.swap(k, pivot);
         let scale = m[k][k];
         m[k].iter_mut().for_each(|value| *value /= scale);
-        for row in (0..n).filter(|&row| row != k) {
-            let factor = m[row][k];
-            for column in 0..2 * n {
-                let change = factor * m[k][column];
-                m[row][column] -= change;
-            }
+        let pivot_row = m[k].clone();
+        for (_, row) in m.iter_mut().enumerate().filter(|(row, _)| *row != k) {
+            let factor = row[k];
+            row.iter_mut().zip(&pivot_row).for_each(|(value, pivot)| *value -= factor * pivot);
         }
     }
     m.into_iter().map(|row| row[n..].to_vec()).collect()

@@ -5,6 +5,7 @@
 mod common;
 
 use common::{pseudo_random, random_vector, team};
+use core::f64::consts::FRAC_PI_2;
 use mikoshi_cooperation::{
     GeneralizedForce, GeneralizedPosition, GeneralizedVelocity, InternalForces, VirtualStick,
     WorkspaceScratch, generalized_velocity, joint_torques, tip_wrenches,
@@ -186,7 +187,7 @@ fn h_and_z_turn_with_the_team_wherever_it_faces() {
     let reference = Grasp::new(somewhere(), 0.05);
     let (h, z) = reference.evaluate();
     for turn in
-        [Vector3::z() * 0.2416, Vector3::z() * 3.1, Vector3::y() * 1.5708, Vector3::new(2.0, 1.0, -2.0)]
+        [Vector3::z() * 0.2416, Vector3::z() * 3.1, Vector3::y() * FRAC_PI_2, Vector3::new(2.0, 1.0, -2.0)]
     {
         let turn = Pose::<World, World>::new(Vector3::new(0.3, 0.2, 0.1), exp(&turn));
         let mut turned = Grasp::new(somewhere(), 0.05);

@@ -74,7 +74,8 @@ fn between_hands(team: &TeamArms, robot: usize, left: Range<usize>, right: Range
 
 /// The inner nodes of the balanced tree over `items`, in level order; the left half is the larger.
 fn halvings(items: usize) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
-    let mut groups = VecDeque::from([0..items]);
+    let mut groups = VecDeque::new();
+    groups.push_back(0..items);
     core::iter::from_fn(move || {
         loop {
             let group = groups.pop_front()?;
