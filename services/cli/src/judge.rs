@@ -25,26 +25,21 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
             ));
         }
     }
-    let is_judged_after_3s = scenario.hybrid.start_s.unwrap_or(0.0) + JUDGED_AFTER_S < summary.sim_time_s;
-    for (name, unit, limit, figure, is_observed) in [
-        (
-            "3 s after the start",
-            "N",
-            limits.internal_after_3s_n,
-            (|row| row.after_3s_n) as fn(&InternalSummary) -> f64,
-            is_judged_after_3s,
-        ),
+    let is_judged_after_3s = is_judged_after_3s(scenario, summary.sim_time_s);
+    let figures: [(_, _, _, fn(&InternalSummary) -> f64, _); 4] = [
+        ("3 s after the start", "N", limits.internal_after_3s_n, |row| row.after_3s_n, is_judged_after_3s),
         ("3 s after the start", "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm, is_judged_after_3s),
         ("at the end", "N", limits.internal_end_n, |row| row.end_n, true),
         ("at the end", "Nm", limits.internal_end_nm, |row| row.end_nm, true),
-    ] {
+    ];
+    for (when, unit, limit, figure, is_observed) in figures {
         let Some(limit) = limit else { continue };
-        if !is_observed {
-            judge.fail(format!("internal forces: the run ends before they are judged, {name}"));
-            continue;
-        }
-        for row in &summary.internal {
-            judge.at_most(format_args!("internal force {} {name}", row.name), figure(row), limit, unit);
+        if is_observed {
+            judge.internal_forces(&summary.internal, when, unit, limit, figure);
+        } else {
+            judge.fail(format!(
+                "internal forces {when}: the run ends before, expected at most {limit} {unit}"
+            ));
         }
     }
 
@@ -59,6 +54,11 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
         judge_robot(&mut judge, scenario, robot);
     }
     judge.failures
+}
+
+/// Whether the run was long enough to be judged [`JUDGED_AFTER_S`] after its hybrid law started.
+pub fn is_judged_after_3s(scenario: &Scenario, sim_time_s: f64) -> bool {
+    scenario.hybrid.start_s.unwrap_or(0.0) + JUDGED_AFTER_S < sim_time_s
 }
 
 fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary) {
@@ -96,6 +96,28 @@ impl Judge {
         self.failures.push(what);
     }
 
+    /// One failure for all rows: the largest, and how many there are.
+    fn internal_forces(
+        &mut self,
+        rows: &[InternalSummary],
+        when: &str,
+        unit: &str,
+        limit: f64,
+        figure: impl Fn(&InternalSummary) -> f64,
+    ) {
+        // NaN fails, and is the largest.
+        let failed = || rows.iter().filter(|row| !(figure(row) <= limit));
+        if let Some(largest) = failed().max_by(|a, b| figure(a).total_cmp(&figure(b))) {
+            self.fail(format!(
+                "{} of {} internal forces {when}: up to {} ({}), expected at most {limit} {unit}",
+                failed().count(),
+                rows.len(),
+                quantity(figure(largest), unit),
+                largest.name
+            ));
+        }
+    }
+
     // Both are written so that NaN fails.
     fn at_most(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
         if !(value <= limit) {
@@ -115,4 +137,39 @@ fn quantity(value: f64, unit: &str) -> String {
     let digits = if value == 0.0 || !value.is_finite() { 0.0 } else { value.abs().log10().floor() };
     let decimals = (3.0 - digits).clamp(0.0, 12.0) as usize;
     format!("{value:.decimals$} {unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_near_its_limit_does_not_read_like_it() {
+        assert_eq!(quantity(0.50004, "N"), "0.5000 N");
+        assert_eq!(quantity(0.5004, "N"), "0.5004 N");
+        assert_eq!(quantity(0.0030049, "m"), "0.003005 m");
+        assert_eq!(quantity(43.21, "N"), "43.21 N");
+        assert_eq!(quantity(f64::NAN, "N"), "NaN N");
+    }
+
+    #[test]
+    fn what_is_not_a_number_fails() {
+        let mut judge = Judge::default();
+        judge.at_most("a", f64::NAN, 1.0, "m");
+        judge.at_least("b", f64::NAN, 1.0, "m");
+        let rows = [("r1", 0.4), ("r2", f64::NAN), ("r3", 0.6)].map(|(name, end_n)| InternalSummary {
+            name: name.into(),
+            end_n,
+            ..InternalSummary::default()
+        });
+        judge.internal_forces(&rows, "at the end", "N", 0.5, |row| row.end_n);
+        assert_eq!(
+            judge.failures,
+            [
+                "a: NaN m, expected at most 1 m",
+                "b: NaN m, expected at least 1 m",
+                "2 of 3 internal forces at the end: up to NaN N (r2), expected at most 0.5 N"
+            ]
+        );
+    }
 }

@@ -55,17 +55,11 @@ impl OutputDirectory {
             rustix::io::Errno::WOULDBLOCK => OpenOutputError::InUse { path: path.to_owned() },
             other => io_error(other.into()),
         })?;
-        for found in RESULTS {
-            let result = path.join(found);
-            if !result.exists() {
-                continue;
-            }
+        if let Some(found) = RESULTS.into_iter().find(|result| path.join(result).exists()) {
             if !force {
                 return Err(OpenOutputError::HoldsResults { path: path.to_owned(), found });
             }
-            let removed =
-                if result.is_dir() { fs::remove_dir_all(&result) } else { fs::remove_file(&result) };
-            removed.map_err(io_error)?;
+            remove_results(path).map_err(io_error)?;
         }
         Ok(Self { path: path.to_owned(), _lock: lock })
     }
@@ -96,6 +90,13 @@ impl OutputDirectory {
         }
     }
 
+    /// Removes what has been written so far, and the folder itself if nothing else is in it.
+    pub fn discard(self) {
+        // What can't be removed is found by the next run, which says so.
+        let _ = remove_results(&self.path);
+        let _ = fs::remove_dir(&self.path);
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
@@ -122,6 +123,17 @@ impl OutputDirectory {
     }
 }
 
+fn remove_results(folder: &Path) -> io::Result<()> {
+    for result in RESULTS.map(|result| folder.join(result)) {
+        let removed = if result.is_dir() { fs::remove_dir_all(&result) } else { fs::remove_file(&result) };
+        match removed {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +152,8 @@ mod tests {
         ));
         let ours = OutputDirectory::open(&path, true).expect("it is forced");
         assert!(!ours.summary().exists() && path.join("notes.txt").exists());
+        ours.discard();
+        assert!(path.join("notes.txt").exists());
     }
 
     #[test]

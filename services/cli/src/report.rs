@@ -1,16 +1,18 @@
 //! What a run came to, for people.
 
+use crate::judge::is_judged_after_3s;
 use crate::table;
 use core::fmt::Write as _;
+use mikoshi_config::Scenario;
 use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
 use std::path::Path;
 
 /// What the paper's fig. 14 shows of its simulation of section 4.3, read off the plots: components start
 /// at up to 40 N and 20 Nm, and all converge to zero.
-const PAPER: [&str; 8] = ["paper, fig. 14", "≤ 40", "≤ 20", "→ 0", "→ 0", "0", "0", ""];
+const PAPER: [&str; 7] = ["paper, fig. 14", "≤ 40", "≤ 20", "→ 0", "→ 0", "0", "0"];
 
 /// The whole report.
-pub fn report(summary: &Summary, out: &Path) -> String {
+pub fn report(scenario: &Scenario, summary: &Summary, out: &Path) -> String {
     let mut text = String::new();
     // Writing to a string can't fail.
     let _ = writeln!(
@@ -19,7 +21,7 @@ pub fn report(summary: &Summary, out: &Path) -> String {
         summary.scenario, summary.seed, summary.sim_time_s, summary.wall_time_s, summary.real_time_factor
     );
     text += "\nInternal forces, true and unfiltered\n";
-    text += &internal_table(&summary.internal);
+    text += &internal_table(scenario, summary);
     let _ = writeln!(
         text,
         "measured against true, last second: within {:.2} N, {:.2} Nm",
@@ -52,20 +54,25 @@ pub fn report(summary: &Summary, out: &Path) -> String {
     text
 }
 
-fn internal_table(rows: &[InternalSummary]) -> String {
+fn internal_table(scenario: &Scenario, summary: &Summary) -> String {
     let titles = ["internal force", "start N", "Nm", "3 s after N", "Nm", "end N", "Nm", "peak N", "Nm"];
+    let is_judged_after_3s = is_judged_after_3s(scenario, summary.sim_time_s);
     let cells = |row: &InternalSummary| {
         let figures = [
-            (row.start_n, row.start_nm),
-            (row.after_3s_n, row.after_3s_nm),
-            (row.end_n, row.end_nm),
-            (row.peak_n, row.peak_nm),
+            (row.start_n, row.start_nm, true),
+            (row.after_3s_n, row.after_3s_nm, is_judged_after_3s),
+            (row.end_n, row.end_nm, true),
+            (row.peak_n, row.peak_nm, true),
         ];
-        let numbers = figures.into_iter().flat_map(|(n, nm)| [format!("{n:.2}"), format!("{nm:.2}")]);
+        let numbers = figures.into_iter().flat_map(|(n, nm, is_known)| {
+            [n, nm].map(|value| if is_known { format!("{value:.2}") } else { "-".to_owned() })
+        });
         core::iter::once(row.name.clone()).chain(numbers).collect()
     };
-    let paper = PAPER.map(str::to_owned).to_vec();
-    table::of_numbers(&titles, rows.iter().map(cells).chain([paper]))
+    // The paper's forces were all brought to zero.
+    let is_as_in_paper = scenario.hybrid.start_s.is_some() && scenario.hybrid.axes.is_empty();
+    let paper = is_as_in_paper.then(|| PAPER.map(str::to_owned).to_vec());
+    table::of_numbers(&titles, summary.internal.iter().map(cells).chain(paper))
 }
 
 fn object_table(object: &ObjectSummary) -> String {

@@ -4,8 +4,8 @@ use crate::arguments::DoctorArguments;
 use crate::binaries;
 use crate::failure::{Failure, Status};
 use crate::print::print_out;
-use mikoshi_ipc_types::ServiceId;
-use mikoshi_runtime::{Domain, RunDirectory};
+use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId};
+use mikoshi_runtime::{Domain, Placement, RunDirectory, TickSchedule, required_bytes};
 use rustix::process::{Resource, getrlimit};
 use serde::Serialize;
 use std::fs;
@@ -13,8 +13,10 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
 const SHARED_MEMORY: &str = "/dev/shm";
-/// What a run of the largest team takes, rounded up.
-const ROOM_BYTES: u64 = 256 << 20;
+/// The team of the paper.
+const USUAL_TEAM: usize = 4;
+/// Memory that a process in real time wants to lock.
+const LOCKED_BYTES: u64 = 256 << 20;
 /// Fewer cores than this run a team of four slower than they could.
 const CORES: usize = 2;
 
@@ -91,29 +93,36 @@ impl Check {
 
 fn check_shared_memory() -> Check {
     const NAME: &str = "shared memory";
-    let mebibytes = |bytes: u64| bytes >> 20;
-    match rustix::fs::statvfs(SHARED_MEMORY) {
-        Err(errno) => Check::unfit(
-            NAME,
-            format!("{SHARED_MEMORY}: {errno}"),
-            format!("mount -t tmpfs tmpfs {SHARED_MEMORY}"),
-        ),
-        Ok(status) => {
-            let free = status.f_bavail.saturating_mul(status.f_frsize);
-            let found = format!("{} MiB free in {SHARED_MEMORY}", mebibytes(free));
-            let fix = format!(
-                "the largest team takes {} MiB: remove what lies there (`mikoshi doctor --clean` removes what is \
-                 ours), or mount -o remount,size=1G {SHARED_MEMORY} (docker: --shm-size=1g)",
-                mebibytes(ROOM_BYTES)
-            );
-            match free {
-                _ if free >= ROOM_BYTES => Check::fit(NAME, found),
-                // A small team needs a part of it.
-                _ if free >= ROOM_BYTES / 8 => Check::advice(NAME, found, fix),
-                _ => Check::unfit(NAME, found, fix),
-            }
+    let status = match rustix::fs::statvfs(SHARED_MEMORY) {
+        Ok(status) => status,
+        Err(errno) => {
+            let found = format!("{SHARED_MEMORY}: {errno}");
+            return Check::unfit(NAME, found, format!("mount -t tmpfs tmpfs {SHARED_MEMORY}"));
         }
+    };
+    let free = status.f_bavail.saturating_mul(status.f_frsize);
+    let (usual, largest) = (room_for(USUAL_TEAM), room_for(MAX_ROBOTS));
+    let found = format!(
+        "{} MiB free in {SHARED_MEMORY}; a run of {USUAL_TEAM} robots takes {}, of {MAX_ROBOTS} robots {}",
+        free >> 20,
+        usual.div_ceil(1 << 20),
+        largest.div_ceil(1 << 20)
+    );
+    let fix = format!(
+        "remove what lies there (`mikoshi doctor --clean` removes what is ours), or \
+         mount -o remount,size=1G {SHARED_MEMORY} (docker: --shm-size=1g)"
+    );
+    match free {
+        _ if free >= largest => Check::fit(NAME, found),
+        _ if free >= usual => Check::advice(NAME, found, fix),
+        _ => Check::unfit(NAME, found, fix),
     }
+}
+
+/// Shared memory that a run of this many robots takes.
+fn room_for(robots: usize) -> u64 {
+    TickSchedule::of_team(robots, 0, &Placement::default())
+        .map_or(u64::MAX, |schedule| required_bytes(&schedule))
 }
 
 fn check_programs() -> Check {
@@ -131,7 +140,7 @@ fn check_simulator() -> Check {
     const NAME: &str = "simulator";
     match binaries::simulator_version() {
         Ok(version) => Check::fit(NAME, version),
-        Err(failure) => Check::unfit(NAME, failure.message, "make build"),
+        Err(failure) => Check::unfit(NAME, failure.message, "make setup build"),
     }
 }
 
@@ -208,7 +217,7 @@ fn check_locked_memory() -> Check {
     const NAME: &str = "locked memory";
     match getrlimit(Resource::Memlock).current {
         None => Check::fit(NAME, "not limited"),
-        Some(bytes) if bytes >= ROOM_BYTES => Check::fit(NAME, format!("{} MiB", bytes >> 20)),
+        Some(bytes) if bytes >= LOCKED_BYTES => Check::fit(NAME, format!("{} MiB", bytes >> 20)),
         Some(bytes) => Check::advice(
             NAME,
             format!("{} KiB; only runs in real time want more", bytes >> 10),

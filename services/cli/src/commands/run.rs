@@ -34,7 +34,14 @@ pub fn run(
     write(&out.scenario(), &text)?;
 
     let mut observer = RunObserver::new(&prepared, &out, !arguments.quiet)?;
-    let outcome = execute(&prepared, &out, &mut observer)?;
+    let outcome = match execute(&prepared, &out, &mut observer) {
+        Ok(outcome) => outcome,
+        Err(failure) => {
+            // There are no results: the folder is as good as new.
+            out.discard();
+            return Err(failure);
+        }
+    };
     let faults = match &outcome {
         Outcome::Fault { faults, .. } => faults.clone(),
         _ => vec![],
@@ -44,7 +51,7 @@ pub fn run(
     match outcome {
         Outcome::Completed => {
             if !arguments.quiet {
-                print_out(&report(&summary, out.path()));
+                print_out(&report(scenario, &summary, out.path()));
             }
             Ok(if summary.passed { Status::Met } else { Status::NotMet })
         }
