@@ -5,7 +5,8 @@ mod team;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use mikoshi_humanoid::balance::{ExternalLoad, PerFoot, Side};
 use mikoshi_humanoid::gait::{
-    GaitConfig, GaitInputs, GaitPhase, GaitReference, GroundPose, HandCentre, StepClock, StepWish,
+    GAIT_STATE_WORDS, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose, HandCentre,
+    StepClock, StepWish,
 };
 use nalgebra::{Vector2, Vector3};
 use team::{Robot, Team, sole_margin, soles};
@@ -326,5 +327,36 @@ fn a_tick_allocates_nothing_and_a_copy_of_the_state_goes_on_alike() {
         });
         assert_eq!(robot.gait.act(&mut twin, &inputs), reference);
         assert_eq!(twin, copy);
+    }
+}
+
+#[test]
+fn words_hold_the_whole_state_of_every_phase() {
+    let mut team = Team::around_an_object(GaitConfig::standard(soles()));
+    team.robots[2].ground_height = 0.008;
+    let mut last_word = 0;
+    for tick in 0..8000 {
+        team.robots[3].ground_height = if (700..840).contains(&tick) { -0.1 } else { 0.0 };
+        team.tick(wandering(tick as f64 * DT));
+        for robot in &team.robots {
+            let words = robot.state.to_words();
+            assert_eq!(GaitState::from_words(&words), Some(robot.state), "tick {tick}");
+            let without_grasp = GaitState { placement: None, ..robot.state };
+            assert_eq!(GaitState::from_words(&without_grasp.to_words()), Some(without_grasp));
+            last_word |= words[GAIT_STATE_WORDS - 1];
+        }
+    }
+    assert_ne!(last_word, 0, "no word is to spare");
+}
+
+#[test]
+fn words_that_no_state_has_are_refused() {
+    let state = Robot::standing_at(GroundPose::default(), GaitConfig::standard(soles())).state;
+    let words = state.to_words();
+    for (word, value) in [(0, 5), (0, 2), (1, f64::NAN.to_bits()), (4, 1), (24, 2), (33, 2), (34, 9), (71, 7)]
+    {
+        let mut wrong = words;
+        wrong[word] = value;
+        assert_eq!(GaitState::from_words(&wrong), None, "word {word} = {value}");
     }
 }

@@ -39,6 +39,7 @@ impl Side {
 }
 
 /// A value for each foot.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PerFoot<T> {
     /// Of the right foot.

@@ -76,7 +76,8 @@ impl StabiliserConfig {
     }
 }
 
-/// All that matters from tick to tick.
+/// All that matters from tick to tick: floats only, without padding.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StabiliserState {
     /// Leaky integral of the divergent component's error \[m s, world\].
@@ -257,3 +258,5 @@ impl Stabiliser {
         }
     }
 }
+
+const _: () = assert!(size_of::<StabiliserState>() == 11 * size_of::<f64>());

@@ -36,10 +36,10 @@ impl HandCentre {
 /// hand, and internal forces that pull a hand by centimetres don't turn the feet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootPlacement {
-    hand_rotation_at_grasp: [UnitQuaternion<f64>; MAX_HANDS],
-    hand_count: usize,
-    heading_at_grasp: f64,
-    foot_in_centre: PerFoot<GroundPose>,
+    pub(super) hand_rotation_at_grasp: [UnitQuaternion<f64>; MAX_HANDS],
+    pub(super) hand_count: usize,
+    pub(super) heading_at_grasp: f64,
+    pub(super) foot_in_centre: PerFoot<GroundPose>,
 }
 
 impl FootPlacement {
