@@ -101,10 +101,13 @@ pub struct Hybrid {
     pub start_s: Option<f64>,
     /// Position gain kz (eq. 39).
     pub kz: f64,
-    /// Force gain kh (eq. 34) of force axes.
-    pub kh_m_n: f64,
-    /// Force gain kh (eq. 34) of moment axes.
-    pub kh_rad_nm: f64,
+    /// Loop gain g = kz·kh·k/2: the share of an internal force that one tick corrects. It determines kh
+    /// (eq. 34), with the stiffness below and the geometry of the grasp.
+    pub loop_gain: f64,
+    /// Stiffness k of a hand against the object: of the grasp, the arm and the robot in series.
+    pub hand_stiffness_n_m: f64,
+    /// The same about an axis.
+    pub hand_stiffness_nm_rad: f64,
     /// Corner frequency of the wrist wrench filter.
     pub filter_hz: f64,
     /// Which internal forces are controlled.

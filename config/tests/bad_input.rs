@@ -322,7 +322,7 @@ fn quantities_lie_in_their_ranges() {
         ("grasp.offset_m", "-0.001", "a finite number from 0"),
         ("hybrid.kz", "1.5", "a number above 0, up to 1"),
         ("hybrid.kz", "0", "a number above 0, up to 1"),
-        ("hybrid.kh_m_n", "-0.0001", "a finite number above 0"),
+        ("hybrid.loop_gain", "-0.0001", "a finite number above 0"),
         ("hybrid.filter_hz", "0", "a finite number above 0"),
         ("hybrid.start_s", "-1", "a finite number from 0"),
         ("hybrid.start_s", "2", "a time before the end (2 s); leave it out for never"),

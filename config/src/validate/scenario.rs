@@ -138,8 +138,9 @@ fn hybrid(checks: &mut Checks, scenario: &Scenario, arms: Option<usize>) {
         checks.require(start < scenario.duration_s, "hybrid.start_s", start, expected);
     }
     checks.require(hybrid.kz > 0.0 && hybrid.kz <= 1.0, "hybrid.kz", hybrid.kz, "a number above 0, up to 1");
-    checks.positive("hybrid.kh_m_n", hybrid.kh_m_n);
-    checks.positive("hybrid.kh_rad_nm", hybrid.kh_rad_nm);
+    checks.positive("hybrid.loop_gain", hybrid.loop_gain);
+    checks.positive("hybrid.hand_stiffness_n_m", hybrid.hand_stiffness_n_m);
+    checks.positive("hybrid.hand_stiffness_nm_rad", hybrid.hand_stiffness_nm_rad);
     checks.positive("hybrid.filter_hz", hybrid.filter_hz);
     if let (InternalForces::Matrix(rows), Some(arms)) = (&hybrid.internal_forces, arms) {
         let key = "hybrid.internal_forces.matrix";

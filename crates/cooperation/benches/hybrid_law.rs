@@ -4,8 +4,8 @@
 
 use divan::{Bencher, black_box};
 use mikoshi_cooperation::{
-    GeneralizedForce, GeneralizedPosition, HandInput, HybridInputs, HybridLaw, HybridParameters,
-    HybridReference, HybridState, InternalForces, RowGains, Selection, TeamArms, VirtualStick,
+    ForceGains, GeneralizedForce, GeneralizedPosition, HandInput, HybridInputs, HybridLaw, HybridParameters,
+    HybridReference, HybridState, InternalForces, Selection, TeamArms, VirtualStick,
 };
 use mikoshi_spatial::{Object, Pose, Twist, World, Wrench, exp};
 use nalgebra::Vector3;
@@ -45,7 +45,7 @@ fn tick(bencher: Bencher, internal_forces: InternalForces) {
     let parameters = HybridParameters {
         period_s: 0.005,
         kz: 0.05,
-        gains: RowGains::scaled(&internal_forces, 1e-4, 2e-4),
+        kh: ForceGains { m_n: 1e-4, rad_nm: 2e-4 },
         selection: Selection::object_position_internal_force(n),
         filter_hz: 10.0,
         lead_limit_m: 0.02,

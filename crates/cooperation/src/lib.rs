@@ -12,9 +12,8 @@
 //!  tip pose y_b, tip wrench q_b
 //!        │ h = [W; C] q_b (11),  z = Uᵀ y_b (27)
 //!  generalized force h_c and position z_c: row 0 the object, rows 1.. the internal forces
-//!        │ hybrid law (37, 39, fig. 4)
-//!  δz
-//!        │ δy_b = [W; C]ᵀ δz, back through the virtual sticks
+//!        │ hybrid law (37, 39, fig. 4): errors (I − S)(z_r − z_c) and S (h_r − h_c)
+//!        │ δy_b = [W; C]ᵀ δz and q_b = U h (7), back through the virtual sticks
 //!  hand references
 //! ```
 //!
@@ -46,8 +45,8 @@ mod workspace;
 pub use gain_bound::{RECOMMENDED_SHARE, critical_loop_gain, loop_gain};
 pub use generalized::{Generalized, GeneralizedForce, GeneralizedPosition, GeneralizedVelocity};
 pub use hybrid::{
-    BuildHybridLawError, HandInput, HandReference, HandStiffness, HybridError, HybridInputs, HybridLaw,
-    HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, RowGains, StartHybridError,
+    BuildHybridLawError, ForceGains, HandInput, HandReference, HandStiffness, HybridError, HybridInputs,
+    HybridLaw, HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, StartHybridError,
 };
 pub use internal_forces::{
     BuildInternalForcesError, InternalForces, RowCombination, change_of_representation, pair_matrix,

@@ -8,8 +8,8 @@ use assert_no_alloc::assert_no_alloc;
 use common::{CAPACITY, ClosedLoop, PERIOD_S, parameters, pseudo_random, random_vector, team};
 use mikoshi_cooperation::{
     Axis, BuildHybridLawError, Control, GeneralizedForce, GeneralizedPosition, HandInput, HybridError,
-    HybridInputs, HybridLaw, HybridParameters, HybridReference, HybridState, InternalForces, RowGains,
-    Selection, StartHybridError, VirtualStick,
+    HybridInputs, HybridLaw, HybridParameters, HybridReference, HybridState, InternalForces, Selection,
+    StartHybridError, VirtualStick,
 };
 use mikoshi_spatial::{Object, Pose, Twist, World, Wrench, exp};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
@@ -126,14 +126,10 @@ fn hand_displacements_by_the_paper(case: &Case, z_c: &GeneralizedPosition) -> Ve
         case.position_ref.internal.iter().map(Twist::to_vector).collect(),
     );
     let S = DMatrix::from_diagonal(&stack(parameters.selection.diagonal().collect()));
-    let k_h = parameters.gains.iter().map(|gains| {
-        let (force, moment) = (gains.kh_force_m_n, gains.kh_moment_rad_nm);
-        Vector6::new(force, force, force, moment, moment, moment)
-    });
-    let k_h = DMatrix::from_diagonal(&stack(k_h.collect()));
     let not_S = DMatrix::identity(6 * n, 6 * n) - &S;
-    let dz = (k_h * S * (h_r - h_c) + &not_S * z_r - &not_S * z_c) * parameters.kz;
+    let dz = (&not_S * z_r - &not_S * z_c) * parameters.kz;
     let dy = W_and_C.transpose() * to_object_axes.transpose() * dz;
+    let dq = &U * to_object_axes.transpose() * &S * (h_r - h_c);
     let object_twist = not_S.fixed_view::<6, 6>(0, 0) * case.twist_ref.to_vector();
     let (v, w): (Vector3<f64>, Vector3<f64>) =
         (object_twist.fixed_rows::<3>(0).into(), object_twist.fixed_rows::<3>(3).into());
@@ -143,8 +139,13 @@ fn hand_displacements_by_the_paper(case: &Case, z_c: &GeneralizedPosition) -> Ve
             let l = hand.pose.rotation * case.sticks[i].X_HB.translation;
             let (dx, dphi): (Vector3<f64>, Vector3<f64>) =
                 (dy.fixed_rows::<3>(6 * i).into(), dy.fixed_rows::<3>(6 * i + 3).into());
+            let (f, n_B): (Vector3<f64>, Vector3<f64>) =
+                (dq.fixed_rows::<3>(6 * i).into(), dq.fixed_rows::<3>(6 * i + 3).into());
+            let n_H = n_B + l.cross(&f);
+            let (give, turn) =
+                (f * parameters.kh.m_n * parameters.kz, n_H * parameters.kh.rad_nm * parameters.kz);
             let feed_forward = v + w.cross(&(hand.pose.translation - X_WA.translation));
-            Twist::new(dx - dphi.cross(&l) + feed_forward * PERIOD_S, dphi + w * PERIOD_S)
+            Twist::new(dx - dphi.cross(&l) + give + feed_forward * PERIOD_S, dphi + turn + w * PERIOD_S)
         })
         .collect()
 }
@@ -245,13 +246,16 @@ fn internal_force_errors_do_not_move_the_object() {
     case.position_ref.external = out.position.external;
     let mut state = case.state();
     case.law.act(&mut state, &mut scratch, &case.inputs(), &mut out).unwrap();
-    let mut mean = Twist::zero();
+    // With hands as stiff as the gains take them to be, what they add to the object's load is nothing.
+    let mut added = Wrench::<World>::zero();
     for ((hand, reference), stick) in case.hands.iter().zip(&out.hands).zip(&case.sticks) {
         let moved = hand.pose_commanded.displacement_to(&reference.pose);
         assert!(moved.to_vector().norm() > 1e-4);
-        mean += moved.shifted(&stick.vector(&hand.pose)) * (1.0 / 8.0);
+        let kh = case.law.parameters().kh;
+        let f_H = Wrench::new(moved.linear / kh.m_n, moved.angular / kh.rad_nm);
+        added += stick.tip_wrench(&hand.pose, &f_H);
     }
-    assert!(mean.to_vector().norm() < 1e-12, "{mean:?}");
+    assert!(added.to_vector().norm() < 1e-9, "{added:?}");
 }
 
 #[test]
@@ -416,21 +420,9 @@ fn parameters_out_of_range_make_no_law() {
     assert_eq!(name_of(|p| p.filter_hz = -1.0), "filter_hz");
     assert_eq!(name_of(|p| p.lead_limit_m = f64::INFINITY), "lead_limit_m");
     assert_eq!(name_of(|p| p.lead_limit_rad = 0.0), "lead_limit_rad");
-    assert_eq!(name_of(|p| p.gains[3].kh_force_m_n = -1.0), "kh_force_m_n");
-    assert_eq!(name_of(|p| p.gains[0].kh_moment_rad_nm = f64::NAN), "kh_moment_rad_nm");
-    assert_eq!(name_of(|p| p.gains.truncate(3)), "gains");
+    assert_eq!(name_of(|p| p.kh.m_n = -1.0), "kh.m_n");
+    assert_eq!(name_of(|p| p.kh.rad_nm = f64::NAN), "kh.rad_nm");
     assert_eq!(name_of(|p| p.selection = Selection::object_position_internal_force(5)), "selections");
-}
-
-#[test]
-fn force_gains_are_scaled_by_the_arms_of_their_row() {
-    let internal_forces = InternalForces::balanced_tree(&team(&[2; 4]));
-    let gains = RowGains::scaled(&internal_forces, 1e-3, 2e-3);
-    let forces: Vec<f64> = gains.iter().map(|gains| gains.kh_force_m_n).collect();
-    // 2 / (arms in the row): 8, 4, 4, and four pairs. Row 0 has 8 arms at full weight.
-    assert_eq!(forces[1..], [0.25e-3, 0.5e-3, 0.5e-3, 1e-3, 1e-3, 1e-3, 1e-3]);
-    assert_eq!(forces[0], 1e-3 / 16.0);
-    assert!(gains.iter().all(|gains| gains.kh_moment_rad_nm == 2e-3));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::canonical::Observation;
 use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
+use mikoshi_cooperation::VirtualStick;
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotTruth, TeamState, mode};
 use mikoshi_spatial::{Hand, Object, Pose, World, Wrench};
 use nalgebra::Vector2;
@@ -60,6 +61,7 @@ pub struct ObservedRun {
 pub struct Figures {
     run: ObservedRun,
     internal: Vec<InternalSummary>,
+    sticks: Vec<VirtualStick>,
     end_samples: u64,
     measurement_error: (f64, f64),
     object: ObjectFigures,
@@ -92,6 +94,7 @@ impl Figures {
         Self {
             run,
             internal,
+            sticks: Vec::new(),
             end_samples: 0,
             measurement_error: (0.0, 0.0),
             object: ObjectFigures::default(),
@@ -117,17 +120,30 @@ impl Figures {
         }
     }
 
-    /// Generalized internal forces from the true wrenches: eqs. A1, 11 and 28.
+    /// True wrenches at the tips of the virtual sticks, in hand order (eq. A1). The sticks are those of the
+    /// true hands when the law started; before, they lead to the object's frame as it is.
+    fn tip_wrenches(&mut self, X_WA: &Pose<World, Object>, observation: &Observation) -> Vec<Wrench<World>> {
+        let is_hybrid = observation.team_state.payload.team_mode == mode::HYBRID;
+        let hands = self.run.robots.iter().zip(&observation.robot_truth).flat_map(|(robot, truth)| {
+            truth.payload.hand_pose.iter().zip(&truth.payload.hand_wrench).take(robot.hands)
+        });
+        let hands = hands.map(|(pose, wrench)| {
+            let X_WH = Pose::<World, Hand>::from_array(pose).unwrap_or_else(Pose::identity);
+            (X_WH, Wrench::<World>::from_array(wrench))
+        });
+        let hands: Vec<_> = hands.collect();
+        if is_hybrid && self.sticks.is_empty() {
+            self.sticks = hands.iter().map(|(X_WH, _)| VirtualStick::at_grasp(X_WH, X_WA)).collect();
+        }
+        let stick = |hand: usize, X_WH: &Pose<World, Hand>| {
+            self.sticks.get(hand).copied().unwrap_or_else(|| VirtualStick::at_grasp(X_WH, X_WA))
+        };
+        hands.iter().enumerate().map(|(i, (X_WH, wrench))| stick(i, X_WH).tip_wrench(X_WH, wrench)).collect()
+    }
+
+    /// Generalized internal forces from the true wrenches: eqs. 11 and 28.
     fn observe_internal_forces(&mut self, tick: u64, X_WA: &Pose<World, Object>, observation: &Observation) {
-        let tips: Vec<Wrench<World>> = self
-            .run
-            .robots
-            .iter()
-            .zip(&observation.robot_truth)
-            .flat_map(|(robot, truth)| {
-                (0..robot.hands).map(move |hand| tip_wrench(&truth.payload, hand, X_WA))
-            })
-            .collect();
+        let tips = self.tip_wrenches(X_WA, observation);
         let seconds = |s: f64| (s / self.run.control_period_s).round() as u64;
         let start = self.run.hybrid_start_tick.unwrap_or(0);
         let judged = start + seconds(JUDGED_AFTER_S)..=start + seconds(JUDGED_AFTER_S + WINDOW_S);
@@ -186,15 +202,6 @@ impl Figures {
             robots: robots.map(|(robot, figures)| figures.finish(robot)).collect(),
             unintended_contact_ticks: self.unintended_contact_ticks,
         }
-    }
-}
-
-/// The true wrench of a hand at the tip of its virtual stick, which is the object's origin (eq. A1).
-fn tip_wrench(truth: &RobotTruth, hand: usize, X_WA: &Pose<World, Object>) -> Wrench<World> {
-    let wrench = Wrench::from_array(&truth.hand_wrench[hand]);
-    match Pose::<World, Hand>::from_array(&truth.hand_pose[hand]) {
-        Some(X_WH) => wrench.shifted(&(X_WH.translation - X_WA.translation)),
-        None => wrench,
     }
 }
 

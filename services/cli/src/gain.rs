@@ -1,16 +1,12 @@
 //! How near the hybrid law's gain comes to the one at which the loop is unstable.
 
 use crate::prepare::Prepared;
-use mikoshi_config::scenario::Grasp;
-use mikoshi_cooperation::{HandStiffness, RECOMMENDED_SHARE, VirtualStick, critical_loop_gain};
-use mikoshi_spatial::Pose;
+use mikoshi_cooperation::{HandStiffness, RECOMMENDED_SHARE, critical_loop_gain};
 use serde::Serialize;
 
 /// Ticks between a reference and its effect in the sensors that no part of the configuration accounts
 /// for: the drives and the robots' structure.
 const DRIVE_DELAY_TICKS: u64 = 1;
-/// What holds a hand behind a weld: mostly the arm's drives.
-const WELD_STIFFNESS: HandStiffness = HandStiffness { n_m: 25_000.0, nm_rad: 1_000.0 };
 
 /// The loop gains of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -27,54 +23,24 @@ pub struct GainReport {
     pub critical: f64,
     /// The share of it to stay within.
     pub recommended_share: f64,
-    /// The gain of the worst combination of all force axes.
-    pub largest: f64,
-    /// The gain of each internal force by itself.
-    pub rows: Vec<RowGain>,
-}
-
-/// The loop gain of one internal force by itself: the share of its error that one tick corrects.
-#[derive(Clone, Debug, Serialize)]
-pub struct RowGain {
-    /// Its name.
-    pub name: String,
-    /// Of its force axes.
-    pub force: f64,
-    /// Of its moment axes, without what virtual sticks add.
-    pub moment: f64,
+    /// The share of an internal force error that one tick corrects, at most.
+    pub gain: f64,
+    /// kh of a hand (eq. 34), for forces.
+    pub kh_m_n: f64,
+    /// The same for moments.
+    pub kh_rad_nm: f64,
 }
 
 impl GainReport {
     /// Of this run.
     pub fn of(prepared: &Prepared) -> Self {
-        let (run, law) = (&prepared.run, &prepared.law);
-        let (scenario, hybrid) = (&run.scenario, &run.scenario.hybrid);
-        let stiffness = match scenario.grasp {
-            Grasp::Weld { .. } => WELD_STIFFNESS,
-            Grasp::Spring { stiffness_n_m, stiffness_nm_rad, .. } => {
-                HandStiffness { n_m: stiffness_n_m, nm_rad: stiffness_nm_rad }
-            }
-        };
+        let (scenario, law) = (&prepared.run.scenario, &prepared.law);
+        let hybrid = &scenario.hybrid;
+        let stiffness =
+            HandStiffness { n_m: hybrid.hand_stiffness_n_m, nm_rad: hybrid.hand_stiffness_nm_rad };
         let delay_ticks =
             scenario.coordination_delay_ticks + scenario.sensors.delay_ticks + DRIVE_DELAY_TICKS;
-        let palms = run.robots.iter().flat_map(|robot| &robot.hand_in_object);
-        let sticks: Vec<_> = palms
-            .filter_map(Pose::from_array)
-            .map(|palm_in_object| VirtualStick::from_hand_in_object(&palm_in_object))
-            .collect();
-        let internal_forces = law.internal_forces();
-        let rows = internal_forces
-            .names()
-            .iter()
-            .zip(internal_forces.row_stiffness())
-            .zip(&law.parameters().gains)
-            .skip(1)
-            .map(|((name, sum_of_squares), kh)| RowGain {
-                name: name.clone(),
-                force: hybrid.kz * kh.kh_force_m_n * stiffness.n_m * sum_of_squares,
-                moment: hybrid.kz * kh.kh_moment_rad_nm * stiffness.nm_rad * sum_of_squares,
-            })
-            .collect();
+        let kh = law.parameters().kh;
         Self {
             delay_ticks,
             filter_hz: hybrid.filter_hz,
@@ -82,14 +48,15 @@ impl GainReport {
             stiffness_nm_rad: stiffness.nm_rad,
             critical: critical_loop_gain(delay_ticks, hybrid.filter_hz, scenario.control_period_s),
             recommended_share: RECOMMENDED_SHARE,
-            largest: law.loop_gain(&sticks, stiffness),
-            rows,
+            gain: kh.loop_gain(hybrid.kz, stiffness),
+            kh_m_n: kh.m_n,
+            kh_rad_nm: kh.rad_nm,
         }
     }
 
-    /// The largest gain in proportion to the critical one.
+    /// The gain in proportion to the critical one.
     pub fn share(&self) -> f64 {
-        self.largest / self.critical
+        self.gain / self.critical
     }
 
     /// What to say where the gain is higher than recommended.
@@ -99,8 +66,8 @@ impl GainReport {
         (!is_within).then(|| {
             format!(
                 "the loop gain {:.3} is {:.0} % of the critical {:.3}, recommended are at most {:.0} %: \
-                 lower hybrid.kz, hybrid.kh_m_n or hybrid.kh_rad_nm",
-                self.largest,
+                 lower hybrid.loop_gain",
+                self.gain,
                 100.0 * self.share(),
                 self.critical,
                 100.0 * self.recommended_share

@@ -1,12 +1,13 @@
 //! From a run's description to the law that controls it.
 
-use mikoshi_config::RunSpec;
 use mikoshi_config::scenario::{Axis, Control, InternalForces as Representation, Scenario};
+use mikoshi_config::{RobotSpec, RunSpec};
 use mikoshi_cooperation as cooperation;
 use mikoshi_cooperation::{
-    BuildHybridLawError, BuildInternalForcesError, BuildTeamArmsError, HybridLaw, HybridParameters,
-    InternalForces, RobotArms, RowGains, Selection, StartHybridError, TeamArms,
+    BuildHybridLawError, BuildInternalForcesError, BuildTeamArmsError, ForceGains, HandStiffness, HybridLaw,
+    HybridParameters, InternalForces, RobotArms, Selection, StartHybridError, TeamArms, VirtualStick,
 };
+use mikoshi_spatial::{Hand, Object, Pose};
 
 /// How far a hand's reference may lead what its robot makes of it.
 const LEAD_LIMIT_M: f64 = 0.02;
@@ -34,7 +35,7 @@ pub enum BuildCoordinatorError {
 
 /// The grasping arms of the team, in hand order.
 pub fn team_arms(run: &RunSpec) -> Result<TeamArms, BuildTeamArmsError> {
-    let arms_of = |robot: &mikoshi_config::RobotSpec| RobotArms {
+    let arms_of = |robot: &RobotSpec| RobotArms {
         robot: robot.member.name.clone(),
         hands: robot.grasping_hands.iter().map(|&hand| robot.config.hands[hand].name.clone()).collect(),
     };
@@ -55,16 +56,32 @@ pub fn build_internal_forces(run: &RunSpec) -> Result<InternalForces, BuildCoord
 pub fn build_hybrid_law(run: &RunSpec) -> Result<HybridLaw, BuildCoordinatorError> {
     let internal_forces = build_internal_forces(run)?;
     let hybrid = &run.scenario.hybrid;
+    let selection = build_selection(&run.scenario, &internal_forces)?;
+    let stiffness = HandStiffness { n_m: hybrid.hand_stiffness_n_m, nm_rad: hybrid.hand_stiffness_nm_rad };
     let parameters = HybridParameters {
         period_s: run.scenario.control_period_s,
         kz: hybrid.kz,
-        gains: RowGains::scaled(&internal_forces, hybrid.kh_m_n, hybrid.kh_rad_nm),
-        selection: build_selection(&run.scenario, &internal_forces)?,
+        kh: ForceGains::of_loop_gain(hybrid.loop_gain, hybrid.kz, stiffness),
+        selection,
         filter_hz: hybrid.filter_hz,
         lead_limit_m: LEAD_LIMIT_M,
         lead_limit_rad: LEAD_LIMIT_RAD,
     };
     Ok(HybridLaw::new(internal_forces, parameters)?)
+}
+
+/// The virtual sticks of all hands, in hand order, as the run's description has the grasp.
+pub fn virtual_sticks(run: &RunSpec) -> Result<Vec<VirtualStick>, BuildCoordinatorError> {
+    let stick = |robot: &RobotSpec, hand: usize, X_AH: &[f64; 7]| {
+        let X_AH = Pose::<Object, Hand>::from_array(X_AH)
+            .ok_or_else(|| BuildCoordinatorError::HandPose { robot: robot.member.name.clone(), hand })?;
+        Ok(VirtualStick::from_hand_in_object(&X_AH))
+    };
+    let of_robot = |robot| {
+        let hands: &RobotSpec = robot;
+        hands.hand_in_object.iter().enumerate().map(move |(hand, X_AH)| stick(hands, hand, X_AH))
+    };
+    run.robots.iter().flat_map(of_robot).collect()
 }
 
 fn build_selection(

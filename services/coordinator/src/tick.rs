@@ -1,6 +1,6 @@
 //! One tick of the team's controller. No allocation, no clock, no I/O, no panic path.
 
-use crate::build::{BuildCoordinatorError, build_hybrid_law};
+use crate::build::{BuildCoordinatorError, build_hybrid_law, virtual_sticks};
 use crate::reference::References;
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
@@ -75,22 +75,13 @@ impl Coordinator {
     pub fn new(run: &RunSpec) -> Result<Self, BuildCoordinatorError> {
         let law = build_hybrid_law(run)?;
         let references = References::new(&run.scenario, law.internal_forces())?;
-        let mut sticks = Vec::with_capacity(law.arms());
-        for robot in &run.robots {
-            for (hand, X_AH) in robot.hand_in_object.iter().enumerate() {
-                let X_AH = Pose::<Object, Hand>::from_array(X_AH).ok_or_else(|| {
-                    BuildCoordinatorError::HandPose { robot: robot.member.name.clone(), hand }
-                })?;
-                sticks.push(VirtualStick::from_hand_in_object(&X_AH));
-            }
-        }
         let period_s = run.scenario.control_period_s;
         Ok(Self {
             law,
             references,
             hybrid_start_tick: run.scenario.hybrid.start_s.map(|start_s| (start_s / period_s).round() as u64),
             hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
-            sticks,
+            sticks: virtual_sticks(run)?,
         })
     }
 

@@ -4,7 +4,7 @@ use super::{
     BuildHybridLawError, HandInput, HandReference, HybridError, HybridInputs, HybridOutput, HybridParameters,
     HybridReference, HybridScratch, HybridState,
 };
-use crate::{GeneralizedForce, GeneralizedPosition, InternalForces, WorkspaceScratch};
+use crate::{GeneralizedForce, GeneralizedPosition, InternalForces, VirtualStick, WorkspaceScratch};
 use core::f64::consts::PI;
 use mikoshi_spatial::{CoordinateFrame, Hand, Object, Pose, Twist, World, Wrench};
 use nalgebra::{Vector3, Vector6};
@@ -20,35 +20,25 @@ pub struct HybridLaw {
     rows: Vec<RowLaw>,
 }
 
-/// The diagonals of eqs. 35, 36 and 39 for one row.
+/// The diagonal of S and of I − S for one row (eqs. 35, 36).
 #[derive(Clone, Copy, Debug)]
 struct RowLaw {
-    /// k_z k_h S.
-    force_gain: Vector6<f64>,
-    /// k_z (I − S).
-    position_gain: Vector6<f64>,
+    /// S.
+    is_force: Vector6<f64>,
     /// I − S.
     is_position: Vector6<f64>,
 }
 
 impl HybridLaw {
-    /// Checks the parameters and precomputes the gains.
+    /// Checks the parameters.
     pub fn new(
         internal_forces: InternalForces,
         parameters: HybridParameters,
     ) -> Result<Self, BuildHybridLawError> {
         parameters.check(&internal_forces)?;
-        let rows = parameters.selection.diagonal().zip(&parameters.gains).map(|(is_force, gains)| {
-            let (force, moment) = (gains.kh_force_m_n, gains.kh_moment_rad_nm);
-            let kh = Vector6::new(force, force, force, moment, moment, moment);
-            let is_position = Vector6::repeat(1.0) - is_force;
-            RowLaw {
-                force_gain: is_force.component_mul(&kh) * parameters.kz,
-                position_gain: is_position * parameters.kz,
-                is_position,
-            }
-        });
-        let rows = rows.collect();
+        let of_row =
+            |is_force: Vector6<f64>| RowLaw { is_force, is_position: Vector6::repeat(1.0) - is_force };
+        let rows = parameters.selection.diagonal().map(of_row).collect();
         let filter_pole = (-2.0 * PI * parameters.filter_hz * parameters.period_s).exp();
         Ok(Self { internal_forces, parameters, filter_pole, rows })
     }
@@ -66,11 +56,6 @@ impl HybridLaw {
     /// Number n of arms.
     pub fn arms(&self) -> usize {
         self.internal_forces.arms()
-    }
-
-    /// k_z k_h S of each row.
-    pub(super) fn force_gains(&self) -> impl Iterator<Item = Vector6<f64>> {
-        self.rows.iter().map(|row| row.force_gain)
     }
 
     /// Workspaces of its size.
@@ -116,18 +101,18 @@ impl HybridLaw {
             return Ok(());
         };
 
-        self.tip_displacements(h_c, z_c, reference, workspace);
+        self.deal_out_errors(h_c, z_c, reference, workspace);
         let object_twist = self.feed_forward(reference);
-        for ((((out, pose), hand), stick), tip) in references
+        for ((((out, pose), hand), stick), (tip, lacking)) in references
             .iter_mut()
             .zip(hand_pose_ref.iter())
             .zip(inputs.hands)
             .zip(sticks.iter())
-            .zip(&workspace.tip_twists)
+            .zip(workspace.tip_twists.iter().zip(&workspace.tip_wrenches))
         {
             // The object and all hands move as one body.
             let twist = object_twist.shifted(&(hand.pose.translation - z_c.external.translation));
-            let feedback = stick.hand_displacement(&hand.pose, tip);
+            let feedback = self.feedback(stick, &hand.pose, tip, lacking);
             // Deviation from eq. 38, which adds to measured joint angles: that turns every servo's droop,
             // divided by kz, into a standing error. References integrate, and measurement closes the loop
             // through z_c alone.
@@ -196,31 +181,64 @@ impl HybridLaw {
         }
     }
 
-    /// The law's δz, and the tips' displacements for it, which it leaves in `workspace.tip_twists`.
-    fn tip_displacements(
+    /// The errors of eq. 37, dealt out to the tips: displacements for the position axes in
+    /// `workspace.tip_twists`, wrenches that are missing on the force axes in `workspace.tip_wrenches`.
+    fn deal_out_errors(
         &self,
         h_c: &GeneralizedForce,
         z_c: &GeneralizedPosition,
         reference: &HybridReference,
         workspace: &mut WorkspaceScratch,
     ) {
-        let WorkspaceScratch { tip_twists, row_twists, work_twists, .. } = workspace;
+        let WorkspaceScratch {
+            tip_twists,
+            row_twists,
+            work_twists,
+            tip_wrenches,
+            row_wrenches,
+            work_wrenches,
+            ..
+        } = workspace;
         let X_WA: &Pose<World, Object> = &z_c.external;
-        let mut rows = self.rows.iter().zip(row_twists.iter_mut());
-        if let Some((row, dz)) = rows.next() {
-            let force_error = reference.force.external - h_c.external;
+        let mut rows = self.rows.iter().zip(row_twists.iter_mut().zip(row_wrenches.iter_mut()));
+        if let Some((row, (dz, dh))) = rows.next() {
             // Deviation from eqs. 37 and 39, which subtract Euler angles and map them by Ba: the rotation
             // vector from z_c to z_r is what Ba (z_r − z_c) stands for, without its singularity.
-            let position_error = X_WA.displacement_to(&reference.position.external);
-            *dz = row.displacement(&force_error, &position_error);
+            *dz = row.position_error(&X_WA.displacement_to(&reference.position.external));
+            *dh = row.force_error(&reference.force.external, &h_c.external);
         }
-        let h_errors = reference.force.internal.iter().zip(&h_c.internal);
-        let z_errors = reference.position.internal.iter().zip(&z_c.internal);
-        for ((row, dz), ((h_r, h_c), (z_r, z_c))) in rows.zip(h_errors.zip(z_errors)) {
-            *dz = row.displacement(&(*h_r - *h_c), &(*z_r - *z_c)).expressed_in(X_WA);
+        let h = reference.force.internal.iter().zip(&h_c.internal);
+        let z = reference.position.internal.iter().zip(&z_c.internal);
+        for ((row, (dz, dh)), ((h_r, h_c), (z_r, z_c))) in rows.zip(h.zip(z)) {
+            *dz = row.position_error(&(*z_r - *z_c)).expressed_in(X_WA);
+            *dh = row.force_error(h_r, h_c).expressed_in(X_WA);
         }
         // By duality with eq. 9; the paper leaves this step to J†.
         self.internal_forces.tip_displacements(row_twists, tip_twists, work_twists);
+        // Eq. 7.
+        self.internal_forces.tip_forces(row_wrenches, tip_wrenches, work_wrenches);
+    }
+
+    /// What feedback adds to a hand's reference: k_z of its tip's displacement, and k_z k_h of the wrench
+    /// that it lacks. The sign holds for wrenches that hands apply TO the object.
+    ///
+    /// Deviation from eqs. 34 to 37, where k_h is a number that turns h_r − h_c into a displacement δz: here
+    /// U deals the force error out to the hands (eq. 7), and each gives way to its share at its own origin.
+    /// Through a virtual stick of length l a rotation of the tip moves the hand by l, so that along δz a grasp
+    /// is up to 1 + l² k/k_φ times as stiff one way as another, and one number is too small for moments in
+    /// the hands or too large for long sticks. Hand by hand it is as stiff as a hand is, all errors shrink
+    /// alike, and the object is not moved, whatever its size and that of the team.
+    fn feedback(
+        &self,
+        stick: &VirtualStick,
+        X_WH: &Pose<World, Hand>,
+        tip: &Twist<World>,
+        lacking: &Wrench<World>,
+    ) -> Twist<World> {
+        let HybridParameters { kz, kh, .. } = &self.parameters;
+        let lacking = stick.hand_wrench(X_WH, lacking);
+        let giving_way = Twist::new(lacking.force * kh.m_n, lacking.moment * kh.rad_nm);
+        (stick.hand_displacement(X_WH, tip) + giving_way) * *kz
     }
 
     /// The object's reference twist on its position axes. Beyond the paper, whose law lags a moving
@@ -245,20 +263,17 @@ impl HybridLaw {
 }
 
 impl RowLaw {
-    /// One row of `k_z Ba (z_r − (I − S) z_c)` with eq. 37 for z_r: `kz (kh S (h_r − h_c) + (I − S)(z_r^input − z_c))`.
+    /// S (h_r − h_c).
+    fn force_error<F: CoordinateFrame>(&self, h_r: &Wrench<F>, h_c: &Wrench<F>) -> Wrench<F> {
+        Wrench::from_vector(&self.is_force.component_mul(&(*h_r - *h_c).to_vector()))
+    }
+
+    /// (I − S) of z_r^input − z_c.
     ///
     /// Deviation from eq. 39, which subtracts all of z_c: fig. 4 has an (I − S) there. Without it force
-    /// axes become springs and keep a standing force. The sign holds for f the wrench that a hand applies
-    /// TO the object.
-    fn displacement<F: CoordinateFrame>(
-        &self,
-        force_error: &Wrench<F>,
-        position_error: &Twist<F>,
-    ) -> Twist<F> {
-        Twist::from_vector(
-            &(self.force_gain.component_mul(&force_error.to_vector())
-                + self.position_gain.component_mul(&position_error.to_vector())),
-        )
+    /// axes become springs and keep a standing force.
+    fn position_error<F: CoordinateFrame>(&self, error: &Twist<F>) -> Twist<F> {
+        Twist::from_vector(&self.is_position.component_mul(&error.to_vector()))
     }
 }
 

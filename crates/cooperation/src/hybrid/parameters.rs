@@ -2,26 +2,39 @@
 
 use crate::{InternalForces, Selection};
 
-/// k_h of one row (eq. 34).
+/// How stiffly one hand, its arm and its robot hold their place against the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RowGains {
-    /// On its force axes \[m/N\].
-    pub kh_force_m_n: f64,
-    /// On its moment axes \[rad/Nm\].
-    pub kh_moment_rad_nm: f64,
+pub struct HandStiffness {
+    /// \[N/m\]
+    pub n_m: f64,
+    /// \[Nm/rad\]
+    pub nm_rad: f64,
 }
 
-impl RowGains {
-    /// The gains of all rows, from those of a pair of arms.
+/// k_h (eq. 34): how far a hand gives way to its share of the force error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceGains {
+    /// To a force \[m/N\].
+    pub m_n: f64,
+    /// To a moment about the hand's own origin \[rad/Nm\].
+    pub rad_nm: f64,
+}
+
+impl ForceGains {
+    /// The gains with which every internal force and moment loses the share g of its error in a tick:
+    /// k_h = g / (k_z k).
+    pub fn of_loop_gain(loop_gain: f64, kz: f64, stiffness: HandStiffness) -> Self {
+        Self { m_n: loop_gain / (kz * stiffness.n_m), rad_nm: loop_gain / (kz * stiffness.nm_rad) }
+    }
+
+    /// The largest share of an internal force error that one tick corrects, over all combinations of forces
+    /// and moments: `k_z max(k_h k)`. Compare with [`critical_loop_gain`](crate::critical_loop_gain).
     ///
-    /// The more arms a row has, the stiffer it is: by Σ c², for a pair ½. The force gain is divided by
-    /// that, so that all rows converge alike; between two groups of N/2 arms it is scaled by 2/N. The
-    /// moment gain is not: a hand's own rotational compliance, which doesn't add up over the arms as
-    /// their stiffness does, governs it, and scaled it leaves moments behind.
-    pub fn scaled(internal_forces: &InternalForces, kh_force_m_n: f64, kh_moment_rad_nm: f64) -> Vec<Self> {
-        let of_row =
-            |stiffness: &f64| Self { kh_force_m_n: kh_force_m_n * 0.5 / stiffness, kh_moment_rad_nm };
-        internal_forces.row_stiffness().iter().map(of_row).collect()
+    /// The object is free, so it takes the place where the hands' wrenches balance. The share is then a
+    /// quotient of two quadratic forms of the hands' wrenches, with k_z k_h above and 1/k below, and lies
+    /// between the smallest and the largest k_z k_h k, whatever the grasp and the team.
+    pub fn loop_gain(&self, kz: f64, stiffness: HandStiffness) -> f64 {
+        kz * f64::max(self.m_n * stiffness.n_m, self.rad_nm * stiffness.nm_rad)
     }
 }
 
@@ -32,8 +45,8 @@ pub struct HybridParameters {
     pub period_s: f64,
     /// k_z (eq. 39): the share of the deviation that one tick removes, in (0, 1].
     pub kz: f64,
-    /// k_h (eq. 34) of each row, n of them.
-    pub gains: Vec<RowGains>,
+    /// k_h (eq. 34) of every hand.
+    pub kh: ForceGains,
     /// S (eq. 35).
     pub selection: Selection,
     /// Corner frequency of the filter of h \[Hz\]; infinite for none.
@@ -58,10 +71,9 @@ impl HybridParameters {
     /// For these internal forces.
     pub(super) fn check(&self, internal_forces: &InternalForces) -> Result<(), BuildHybridLawError> {
         let rows = internal_forces.arms();
-        for (name, found) in [("gains", self.gains.len()), ("selections", self.selection.rows().len())] {
-            if found != rows {
-                return Err(BuildHybridLawError::RowCount { name, rows, found });
-            }
+        let found = self.selection.rows().len();
+        if found != rows {
+            return Err(BuildHybridLawError::RowCount { name: "selections", rows, found });
         }
         let in_range = |name, value: f64, expected, is_valid: bool| {
             if is_valid { Ok(()) } else { Err(BuildHybridLawError::OutOfRange { name, expected, value }) }
@@ -72,12 +84,8 @@ impl HybridParameters {
         in_range("filter_hz", self.filter_hz, "positive or infinite", self.filter_hz > 0.0)?;
         in_range("lead_limit_m", self.lead_limit_m, "positive", is_positive(self.lead_limit_m))?;
         in_range("lead_limit_rad", self.lead_limit_rad, "positive", is_positive(self.lead_limit_rad))?;
-        for gains in &self.gains {
-            for (name, kh) in
-                [("kh_force_m_n", gains.kh_force_m_n), ("kh_moment_rad_nm", gains.kh_moment_rad_nm)]
-            {
-                in_range(name, kh, "finite and not negative", kh.is_finite() && kh >= 0.0)?;
-            }
+        for (name, kh) in [("kh.m_n", self.kh.m_n), ("kh.rad_nm", self.kh.rad_nm)] {
+            in_range(name, kh, "finite and not negative", kh.is_finite() && kh >= 0.0)?;
         }
         Ok(())
     }

@@ -4,8 +4,8 @@
 #![allow(non_snake_case)]
 
 use mikoshi_cooperation::{
-    GeneralizedForce, GeneralizedPosition, HandInput, HandStiffness, HybridInputs, HybridLaw, HybridOutput,
-    HybridParameters, HybridReference, HybridScratch, HybridState, InternalForces, RowGains, Selection,
+    ForceGains, GeneralizedForce, GeneralizedPosition, HandInput, HandStiffness, HybridInputs, HybridLaw,
+    HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, InternalForces, Selection,
     TeamArms, VirtualStick,
 };
 use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench, exp, skew};
@@ -49,7 +49,7 @@ pub fn parameters(internal_forces: &InternalForces) -> HybridParameters {
     HybridParameters {
         period_s: PERIOD_S,
         kz: 0.05,
-        gains: RowGains::scaled(internal_forces, 1e-3, 3e-3),
+        kh: ForceGains { m_n: 1e-3, rad_nm: 3e-3 },
         selection: Selection::object_position_internal_force(internal_forces.arms()),
         filter_hz: FILTER_HZ,
         lead_limit_m: 0.1,
@@ -122,27 +122,27 @@ impl ClosedLoop {
         self.grasp.iter().zip(hands).map(wrench).collect()
     }
 
-    /// The object moves to where all wrenches balance: Newton's method on its pose.
+    /// The object moves to where all wrenches balance: Newton's method with the stiffness of its first step.
     fn settle(&mut self) {
-        for _ in 0..8 {
+        let mut stiffness = Matrix6::zeros();
+        for X_WH in self.hands.front().unwrap() {
+            let lever = skew(&(X_WH.translation - self.X_WA.translation)) * STIFFNESS.n_m;
+            let mut of_hand = Matrix6::from_diagonal_element(STIFFNESS.n_m);
+            of_hand.fixed_view_mut::<3, 3>(0, 3).copy_from(&-lever);
+            of_hand.fixed_view_mut::<3, 3>(3, 0).copy_from(&lever);
+            let rotational = Matrix3::identity() * STIFFNESS.nm_rad - lever * lever / STIFFNESS.n_m;
+            of_hand.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotational);
+            stiffness += of_hand;
+        }
+        let compliance = stiffness.try_inverse().unwrap();
+        for _ in 0..20 {
             let mut residual = Wrench::zero();
-            let mut stiffness = Matrix6::zeros();
             for (f_H, X_WH) in self.hand_wrenches().iter().zip(self.hands.front().unwrap()) {
-                let p_AH = X_WH.translation - self.X_WA.translation;
-                residual += f_H.shifted(&p_AH);
-                let lever = skew(&p_AH);
-                let k = Matrix3::identity() * STIFFNESS.n_m;
-                let mut of_hand = Matrix6::zeros();
-                of_hand.fixed_view_mut::<3, 3>(0, 0).copy_from(&k);
-                of_hand.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-k * lever));
-                of_hand.fixed_view_mut::<3, 3>(3, 0).copy_from(&(lever * k));
-                let rotational = Matrix3::identity() * STIFFNESS.nm_rad - lever * k * lever;
-                of_hand.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotational);
-                stiffness += of_hand;
+                residual += f_H.shifted(&(X_WH.translation - self.X_WA.translation));
             }
-            let step = stiffness.lu().solve(&residual.to_vector()).unwrap();
+            let step = compliance * residual.to_vector();
             self.X_WA = self.X_WA.displaced(&Twist::from_vector(&step));
-            if step.norm() < 1e-11 {
+            if step.norm() < 1e-10 {
                 break;
             }
         }

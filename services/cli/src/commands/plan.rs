@@ -166,11 +166,13 @@ impl<'a> Plan<'a> {
 
     fn gains_text(&self) -> String {
         let gains = &self.gains;
-        let mut text = format!(
-            "{:.4} for the worst combination of force axes: {:.0} % of the critical {:.3} \
-             (at most {:.0} % recommended)\n\
-             {} ticks of delay, {} Hz filter, {} N/m and {} Nm/rad a hand\n",
-            gains.largest,
+        format!(
+            "{:.3} by kh = {:.3e} m/N and {:.3e} rad/Nm: {:.0} % of the critical {:.3}, at which the loop is \
+             unstable;\nrecommended are at most {:.0} % ({} ticks of delay, {} Hz filter, {} N/m and {} Nm/rad \
+             a hand)\n",
+            gains.gain,
+            gains.kh_m_n,
+            gains.kh_rad_nm,
             100.0 * gains.share(),
             gains.critical,
             100.0 * gains.recommended_share,
@@ -178,16 +180,7 @@ impl<'a> Plan<'a> {
             gains.filter_hz,
             gains.stiffness_n_m,
             gains.stiffness_nm_rad
-        );
-        let percent = |gain: f64| format!("{:.0} %", 100.0 * gain / gains.critical);
-        text += &table::of_numbers(
-            &["row by itself", "force", "of critical", "moment", "of critical"],
-            gains.rows.iter().map(|row| {
-                let (force, moment) = (format!("{:.4}", row.force), format!("{:.4}", row.moment));
-                vec![row.name.clone(), force, percent(row.force), moment, percent(row.moment)]
-            }),
-        );
-        text
+        )
     }
 }
 
