@@ -468,6 +468,16 @@ mod tests {
     }
 
     #[test]
+    fn a_board_that_was_cut_is_rejected() {
+        let directory = tempfile::tempdir().expect("a directory");
+        Board::create(directory.path(), &services(), false).expect("a board");
+        let path = directory.path().join(FILE);
+        let whole = std::fs::read(&path).expect("it is readable");
+        std::fs::write(&path, &whole[..whole.len() - 1]).expect("it is writable");
+        assert!(matches!(Board::open(directory.path()), Err(BoardError::NotABoard { .. })));
+    }
+
+    #[test]
     fn a_run_has_one_board() {
         let directory = tempfile::tempdir().expect("a directory");
         let board = Board::create(directory.path(), &services(), false).expect("a board");

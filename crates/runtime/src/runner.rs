@@ -54,7 +54,7 @@ pub trait Session {
     ///
     /// # Errors
     /// The outcome's own; a process that was lost after the last tick.
-    fn finish(&self, ticks: u64, outcome: Result<(), TickError>) -> Result<(), TickError>;
+    fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError>;
 }
 
 /// What ended a run early.
@@ -131,6 +131,6 @@ pub fn run_service<P: Participant>(
         Ok(())
     };
     let outcome = run();
-    session.finish(ticks, outcome).map_err(|error| RunFault { service, tick, error })?;
+    session.finish(outcome).map_err(|error| RunFault { service, tick, error })?;
     Ok(ticks)
 }

@@ -146,7 +146,7 @@ impl Session for FrugalSession<'_> {
         with_allocations(0, || self.0.begin_tick(tick))
     }
 
-    fn finish(&self, ticks: u64, outcome: Result<(), TickError>) -> Result<(), TickError> {
-        self.0.finish(ticks, outcome)
+    fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {
+        self.0.finish(outcome)
     }
 }

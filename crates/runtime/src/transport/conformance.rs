@@ -390,15 +390,30 @@ fn between_processes_a_publisher_that_dies_ends_the_wait_for_it() {
 }
 
 #[test]
-fn what_a_publisher_sent_before_it_died_still_arrives() {
+fn what_a_publisher_sent_before_it_ended_still_arrives() {
     let run = Iceoryx::of(schedule());
+    let tap = run.tap();
+    let mut observer = tap.observer::<Sensors>(1).expect("it is published");
     let (mut publisher, mut subscriber) = sensors(&run);
     run.transport(SERVO).process.connect();
-    send(&mut publisher, 0);
+    for tick in 0..3 {
+        // A tap that looks only now and then.
+        if tick == 1 {
+            assert_eq!(observer.try_receive(&mut Frame::zeroed()), Ok(true));
+        }
+        send(&mut publisher, tick);
+    }
     drop(publisher);
     run.end(BRIDGE);
-    assert_eq!(receive(&mut subscriber, 0).expect("it was sent").envelope.tick, 0);
-    assert_eq!(receive(&mut subscriber, 1).expect_err("it is gone"), TickError::PeerLost(BRIDGE));
+    for tick in 0..3 {
+        assert_eq!(receive(&mut subscriber, tick).expect("it was sent").envelope.tick, tick);
+    }
+    assert_eq!(receive(&mut subscriber, 3).expect_err("it is gone"), TickError::PeerLost(BRIDGE));
+    let mut frame = Frame::zeroed();
+    for tick in 1..3 {
+        assert_eq!(observer.receive(&mut frame), Ok(true));
+        assert_eq!(frame.envelope.tick, tick);
+    }
 }
 
 #[test]

@@ -227,15 +227,11 @@ impl Session for IceoryxTransport {
         Ok(())
     }
 
-    fn finish(&self, ticks: u64, outcome: Result<(), TickError>) -> Result<(), TickError> {
+    fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {
         let member = &self.process.member;
-        let met = outcome.and_then(|()| {
-            if self.opens_tick {
-                member.wait_for_tap(ticks)?;
-            }
-            // Nobody takes its ports away while others may still read from them.
-            member.meet(State::Done)
-        });
+        // Nobody takes its ports away while others may still read from them. Observers are not waited
+        // for: what they are connected to stays until they have read it.
+        let met = outcome.and_then(|()| member.meet(State::Done));
         if let Err(error) = &met {
             member.fail(error);
         }
