@@ -6,7 +6,8 @@ use mikoshi_cooperation::{GeneralizedForce, GeneralizedPosition, InternalForces}
 use mikoshi_spatial::{CoordinateFrame, Object, Pose, Twist, World, Wrench};
 use nalgebra::Vector6;
 
-/// References grow from zero over this time, so that no hand jumps when control starts.
+/// References go from what is there when control starts to what is asked for in this time, so that no hand
+/// jumps.
 const RAMP_S: f64 = 1.0;
 
 /// Constant references of single axes, by row.
@@ -40,28 +41,51 @@ impl References {
         Ok(Self { rows, ramp_ticks: RAMP_S / scenario.control_period_s })
     }
 
-    /// Fills in h_r and z_r, `ticks` ticks after control started with the object at `X_WA_start`.
+    /// Fills in h_r and z_r, `ticks` ticks after control started with the object at `X_WA_start` and the
+    /// generalized force at `force_start`: from there they go to what is asked for.
     pub(crate) fn fill(
         &self,
         ticks: u64,
         X_WA_start: &Pose<World, Object>,
+        force_start: &[[f64; 6]],
         force: &mut GeneralizedForce,
         position: &mut GeneralizedPosition,
     ) {
-        let ramp = (ticks as f64 / self.ramp_ticks).min(1.0);
-        let mut rows = self.rows.iter();
-        if let Some(object) = rows.next() {
-            force.external = Wrench::from_vector(&(object.force * ramp));
-            position.external = X_WA_start.displaced(&Twist::from_vector(&(object.position * ramp)));
+        let share = smooth_step(ticks as f64 / self.ramp_ticks);
+        let mut rows = self.rows.iter().zip(force_start);
+        if let Some((object, start)) = rows.next() {
+            force.external = between(start, &object.force, share);
+            position.external = X_WA_start.displaced(&Twist::from_vector(&(object.position * share)));
         }
         let outputs = force.internal.iter_mut().zip(position.internal.iter_mut());
-        for (row, (force, position)) in rows.zip(outputs) {
-            *force = scaled_wrench(&row.force, ramp);
-            *position = Twist::from_vector(&(row.position * ramp));
+        for ((row, start), (force, position)) in rows.zip(outputs) {
+            *force = between(start, &row.force, share);
+            *position = Twist::from_vector(&(row.position * share));
         }
     }
 }
 
-fn scaled_wrench<F: CoordinateFrame>(wrench: &Vector6<f64>, scale: f64) -> Wrench<F> {
-    Wrench::from_vector(&(wrench * scale))
+/// The wrench that lies the given share of the way from `start` to `target`.
+fn between<F: CoordinateFrame>(start: &[f64; 6], target: &Vector6<f64>, share: f64) -> Wrench<F> {
+    let start = Vector6::from(*start);
+    Wrench::from_vector(&(start + (target - start) * share))
+}
+
+/// 3x² − 2x³ within 0 and 1: it starts and ends at rest.
+fn smooth_step(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_start_and_end_at_rest_where_they_should() {
+        assert_eq!([-1.0, 0.0, 0.5, 1.0, 2.0].map(smooth_step), [0.0, 0.0, 0.5, 1.0, 1.0]);
+        assert!(smooth_step(1e-3) < 4e-6 && smooth_step(1.0 - 1e-3) > 1.0 - 4e-6);
+        let wrench: Wrench<Object> = between(&[8.0; 6], &Vector6::repeat(20.0), 0.25);
+        assert_eq!(wrench.to_array(), [11.0; 6]);
+    }
 }

@@ -29,6 +29,8 @@ pub struct CoordinatorState {
     hybrid: HybridState<MAX_HANDS_OF_TEAM>,
     /// Object pose by the virtual sticks when the hybrid law started.
     object_pose_at_start: [f64; 7],
+    /// Generalized force then, row by row.
+    force_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// One of [`mode`].
     team_mode: u64,
 }
@@ -93,6 +95,7 @@ impl Coordinator {
         Ok(CoordinatorState {
             hybrid: HybridState::at_grasp(&self.sticks)?,
             object_pose_at_start: Pose::<World, Object>::identity().to_array(),
+            force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             team_mode: mode::HOLD,
         })
     }
@@ -125,7 +128,7 @@ impl Coordinator {
         let is_hybrid = state.team_mode == mode::HYBRID;
         let X_WA_start = Pose::from_array(&state.object_pose_at_start).ok_or(CoordinateError::Law)?;
         let ticks_since_start = tick.saturating_sub(self.hybrid_start_tick.unwrap_or(tick));
-        self.references.fill(ticks_since_start, &X_WA_start, force_ref, position_ref);
+        self.references.fill(ticks_since_start, &X_WA_start, &state.force_at_start, force_ref, position_ref);
         let reference = is_hybrid.then_some(HybridReference {
             force: force_ref,
             position: position_ref,
@@ -144,7 +147,7 @@ impl Coordinator {
             out,
         );
         if state.team_mode == mode::HOLD && self.hybrid_start_tick.is_some_and(|start| tick + 1 >= start) {
-            self.start_hybrid(state, hands, &law_output.position.external);
+            self.start_hybrid(state, hands, law_output);
         }
         Ok(())
     }
@@ -152,11 +155,13 @@ impl Coordinator {
     /// Creates the virtual sticks anew from the hands as they are now (section 4.3, step 2): whatever the
     /// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the
     /// object from here on. Control starts where the object is, not where it should be: nothing jumps.
-    fn start_hybrid(&self, state: &mut CoordinatorState, hands: &[HandInput], X_WA: &Pose<World, Object>) {
+    fn start_hybrid(&self, state: &mut CoordinatorState, hands: &[HandInput], law: &HybridOutput) {
+        let X_WA = &law.position.external;
         for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
             *slot = VirtualStick::at_grasp(&hand.pose, X_WA).X_HB.to_array();
         }
         state.object_pose_at_start = X_WA.to_array();
+        write_force(&law.force, &mut state.force_at_start);
         state.team_mode = mode::HYBRID;
     }
 
