@@ -331,6 +331,30 @@ fn a_tick_allocates_nothing_and_a_copy_of_the_state_goes_on_alike() {
 }
 
 #[test]
+fn from_any_tick_a_robot_left_alone_comes_to_stand_on_two_feet() {
+    let mut team = Team::around_an_object(GaitConfig::standard(soles()));
+    let timing = team.robots[0].gait.config().timing;
+    for tick in 0..2400 {
+        team.tick(wandering(tick as f64 * DT));
+        if tick % 29 != 0 {
+            continue;
+        }
+        for robot in &team.robots {
+            let mut alone = robot.clone();
+            alone.centre = HandCentre { velocity: Vector2::zeros(), yaw_rate: 0.0, ..alone.centre };
+            let mut clock = team.clock.clock;
+            while clock != StepClock::Standing {
+                clock = clock.extrapolated(&timing, 1);
+                alone.act(clock);
+                assert!(margin(&alone) > 0.02, "from tick {tick}, {clock:?}: {}", margin(&alone));
+            }
+            assert!(matches!(alone.state.phase, GaitPhase::Standing { .. }));
+            assert!(alone.state.preview.com_velocity.norm() < 5e-3);
+        }
+    }
+}
+
+#[test]
 fn words_hold_the_whole_state_of_every_phase() {
     let mut team = Team::around_an_object(GaitConfig::standard(soles()));
     team.robots[2].ground_height = 0.008;

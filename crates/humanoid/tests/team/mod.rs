@@ -20,6 +20,7 @@ pub fn soles() -> PerFoot<SoleRectangle> {
     }
 }
 
+#[derive(Clone)]
 pub struct Robot {
     pub gait: Gait,
     pub state: GaitState,
