@@ -140,6 +140,13 @@ fn double_support_lifts_the_next_foot_once_the_last_has_landed() {
 }
 
 #[test]
+fn who_comes_too_late_for_a_lift_off_stays_on_two_feet() {
+    assert_eq!(next(double(1, None), stepping(1, 5)), double(1, None));
+    assert_eq!(next(shifting(), stepping(0, 12)), shifting());
+    assert_eq!(next(double(1, None), stepping(2, 0)), finishing(None));
+}
+
+#[test]
 fn double_support_finishes_when_the_walk_is_given_up() {
     let landing = Some(swinging(Side::Left));
     assert_eq!(next(double(1, landing), FINISHING), finishing(landing));

@@ -331,6 +331,22 @@ fn a_tick_allocates_nothing_and_a_copy_of_the_state_goes_on_alike() {
 }
 
 #[test]
+fn both_feet_are_judged_by_the_stopping_threshold_after_the_next_landing() {
+    let wish = |left: f64, right: f64| {
+        let mut robot = Robot::standing_at(GroundPose::default(), GaitConfig::standard(soles()));
+        robot.state.feet.left.pose.position.x -= left;
+        robot.state.feet.right.pose.position.x -= right;
+        robot.wish()
+    };
+    assert!(!wish(0.025, 0.025).wants_step, "below the starting threshold");
+    let one = wish(0.05, 0.015);
+    assert!(one.wants_step && one.can_stop && one.first_swing == Side::Left, "one step is enough");
+    let two = wish(0.05, 0.025);
+    assert!(two.wants_step && !two.can_stop, "the other foot stays too far off to stop there");
+    assert!((two.urgency - 0.05 / 0.03).abs() < 1e-9);
+}
+
+#[test]
 fn from_any_tick_a_robot_left_alone_comes_to_stand_on_two_feet() {
     let mut team = Team::around_an_object(GaitConfig::standard(soles()));
     let timing = team.robots[0].gait.config().timing;

@@ -13,7 +13,7 @@
 //!
 //! The robot never runs ahead of the clock, and where the clock asks for what it can't do it stays on
 //! the feet it has: a foot that has not landed is lowered further in `DoubleSupport` and `Finishing`
-//! (`landing`), and nothing is lifted before.
+//! (`landing`), and nothing is lifted before, nor long after its lift-off.
 
 use super::ground_pose::GroundPose;
 use super::step_clock::{StepClock, StepTiming};
@@ -117,10 +117,10 @@ impl GaitPhase {
                 Self::ShiftingWeight { zmp_from, step },
                 StepClock::Stepping { step_index: 0, tick_in_step, .. },
             ) => {
-                if tick_in_step < timing.lift_off(0) {
-                    Self::ShiftingWeight { zmp_from, step }
-                } else {
+                if may_lift(timing, 0, tick_in_step) {
                     Self::lift_off(step, feet)
+                } else {
+                    Self::ShiftingWeight { zmp_from, step }
                 }
             }
             (Self::ShiftingWeight { .. }, _) => Self::Finishing { zmp_from: zmp_ref, landing: None },
@@ -143,7 +143,7 @@ impl GaitPhase {
                 Self::DoubleSupport { step, landing, .. },
                 StepClock::Stepping { step_index, tick_in_step, .. },
             ) if step.index == step_index => {
-                if landing.is_none() && tick_in_step >= timing.lift_off(step_index) {
+                if landing.is_none() && may_lift(timing, step_index, tick_in_step) {
                     Self::lift_off(step, feet)
                 } else {
                     self
@@ -227,4 +227,11 @@ impl GaitPhase {
             _ => false,
         }
     }
+}
+
+/// Whether a swing may begin: from lift-off on, and not so late that the foot would have to catch up
+/// with a swing that is visibly under way.
+fn may_lift(timing: &StepTiming, step_index: u64, tick_in_step: u64) -> bool {
+    let lift_off = timing.lift_off(step_index);
+    (lift_off..=lift_off + timing.single_support / 10).contains(&tick_in_step)
 }
