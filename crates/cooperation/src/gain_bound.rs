@@ -1,9 +1,9 @@
 //! How high the hybrid law's gain may be, given its delay.
 //!
 //! Along one force axis the loop is an integrator (the hand references), a spring (hand against object)
-//! and the wrench filter. For a pair of arms of stiffness k each, moving the row's position by δ changes
-//! its force by k δ / 2, so that one tick changes it by g = kz·kh·k/2 of the error. With a = exp(−2π f T)
-//! the open loop is
+//! and the wrench filter. A hand of stiffness k that gives way by kz kh to each newton of its error corrects
+//! the share g = kz·kh·k of it in a tick. (With the paper's kh, by which two arms share the displacement of
+//! their row, g = kz·kh·k/2.) With a = exp(−2π f T) the open loop is
 //! ```text
 //! L(z) = g · z⁻¹/(1 − z⁻¹) · (1 − a)/(1 − a z⁻¹) · z⁻ᴰ
 //! ```
@@ -16,15 +16,8 @@ use core::f64::consts::PI;
 /// unstable at less than half of what this first-order model allows.
 pub const RECOMMENDED_SHARE: f64 = 0.3;
 
-/// Loop gain per tick g = kz·kh·k/2 of a row between two equal groups of arms, with force gain `kh` scaled
-/// by the arms in that row: the filter's and the delay's share aside.
-///
-/// `kz` \[-\], `kh` \[m/N or rad/Nm\], `stiffness` k of one hand \[N/m or Nm/rad\].
-pub fn loop_gain(kz: f64, kh: f64, stiffness: f64) -> f64 {
-    0.5 * kz * kh * stiffness
-}
-
-/// The g at which L(z) reaches −1: above it the loop is unstable. An infinite `filter_hz` is no filter.
+/// The g at which L(z) reaches −1, to compare with [`ForceGains::loop_gain`](crate::ForceGains::loop_gain):
+/// above it the loop is unstable. An infinite `filter_hz` is no filter.
 ///
 /// With a 10 Hz filter at 5 ms it is 1.0, .53, .37, .18, .10 for D = 1, 2, 3, 7, 13.
 ///

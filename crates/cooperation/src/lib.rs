@@ -17,6 +17,56 @@
 //!  hand references
 //! ```
 //!
+//! ```
+//! use mikoshi_cooperation::{
+//!     ForceGains, GeneralizedForce, GeneralizedPosition, HandInput, HandStiffness, HybridInputs, HybridLaw,
+//!     HybridParameters, HybridReference, HybridState, InternalForces, Selection, TeamArms, VirtualStick,
+//! };
+//! use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench};
+//! use nalgebra::{UnitQuaternion, Vector3};
+//!
+//! // Two one-armed robots hold an object between them, 1 m apart.
+//! let at = |x| Pose::<Object, Hand>::new(Vector3::new(x, 0.0, 0.0), UnitQuaternion::identity());
+//! let sticks = [at(-0.5), at(0.5)].map(|X_AH| VirtualStick::from_hand_in_object(&X_AH));
+//! let internal_forces = InternalForces::balanced_tree(&TeamArms::numbered(&[1, 1])?);
+//! assert_eq!(internal_forces.names(), ["object", "A|B"]);
+//!
+//! let stiffness = HandStiffness { n_m: 1000.0, nm_rad: 300.0 };
+//! let parameters = HybridParameters {
+//!     period_s: 0.005,
+//!     kz: 0.05,
+//!     kh: ForceGains::of_loop_gain(0.02, 0.05, stiffness),
+//!     selection: Selection::object_position_internal_force(2),
+//!     filter_hz: 10.0,
+//!     lead_limit_m: 0.02,
+//!     lead_limit_rad: 0.05,
+//! };
+//! let law = HybridLaw::new(internal_forces, parameters)?;
+//! let mut state = HybridState::<2>::at_grasp(&sticks)?;
+//! let (mut scratch, mut out) = (law.scratch(), law.output());
+//!
+//! // Each presses with 10 N against the other.
+//! let X_WA = Pose::<World, Object>::identity();
+//! let hand = |x, force| {
+//!     let pose = X_WA * at(x);
+//!     let wrench = Wrench::new(Vector3::new(force, 0.0, 0.0), Vector3::zeros());
+//!     HandInput { pose, pose_commanded: pose, wrench }
+//! };
+//! let hands = [hand(-0.5, 10.0), hand(0.5, -10.0)];
+//! let reference = HybridReference {
+//!     force: &GeneralizedForce::zero(2),
+//!     position: &GeneralizedPosition::at_grasp(X_WA, 2),
+//!     object_twist: Twist::zero(),
+//! };
+//! law.act(&mut state, &mut scratch, &HybridInputs { hands: &hands, reference: Some(reference) }, &mut out)?;
+//!
+//! // So each gives way by 2 % of what its 10 N compress.
+//! assert_eq!(out.force.internal[0].force.x, 10.0);
+//! assert!((out.hands[0].pose.translation.x - (-0.5 - 0.02 * 10.0 / 1000.0)).abs() < 1e-12);
+//! assert!((out.hands[1].pose.translation.x - (0.5 + 0.02 * 10.0 / 1000.0)).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! All 6 × 6 blocks of W, C, W⁻, V and U are scalar multiples of the identity, so only the n × n scalar
 //! matrices exist here; [`InternalForces`] applies them to six-vectors.
 //!
@@ -42,7 +92,7 @@ mod torque;
 mod virtual_stick;
 mod workspace;
 
-pub use gain_bound::{RECOMMENDED_SHARE, critical_loop_gain, loop_gain};
+pub use gain_bound::{RECOMMENDED_SHARE, critical_loop_gain};
 pub use generalized::{Generalized, GeneralizedForce, GeneralizedPosition, GeneralizedVelocity};
 pub use hybrid::{
     BuildHybridLawError, ForceGains, HandInput, HandReference, HandStiffness, HybridError, HybridInputs,

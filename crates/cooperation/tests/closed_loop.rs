@@ -6,9 +6,9 @@ mod common;
 
 use common::{ClosedLoop, FILTER_HZ, PERIOD_S, STIFFNESS, parameters, team};
 use mikoshi_cooperation::{
-    Axis, Control, ForceGains, HybridLaw, HybridParameters, InternalForces, critical_loop_gain, loop_gain,
+    Axis, Control, ForceGains, HybridLaw, HybridParameters, InternalForces, critical_loop_gain,
 };
-use mikoshi_spatial::Twist;
+use mikoshi_spatial::{Object, Twist};
 use nalgebra::Vector3;
 
 const TICKS_OF_3_S: usize = 600;
@@ -206,8 +206,6 @@ fn all_internal_forces_of_any_team_shrink_at_the_rate_of_the_loop_gain() {
 fn the_loop_gain_is_that_of_the_stiffer_way() {
     let kh = ForceGains { m_n: 1e-3, rad_nm: 5e-3 };
     assert!((kh.loop_gain(0.05, STIFFNESS) - 0.05 * 5e-3 * STIFFNESS.nm_rad).abs() < 1e-15);
-    // The paper's kh moves the difference of two arms, half of it each.
-    assert!((loop_gain(0.05, 2e-3, STIFFNESS.n_m) - 0.05 * kh.m_n * STIFFNESS.n_m).abs() < 1e-15);
     let same = ForceGains::of_loop_gain(0.03, 0.05, STIFFNESS);
     assert!((same.loop_gain(0.05, STIFFNESS) - 0.03).abs() < 1e-15);
 }
@@ -231,4 +229,21 @@ fn a_reference_waits_for_a_hand_that_does_not_follow() {
         assert!(lead.linear.norm() < 0.02 + 1e-12 && lead.angular.norm() < 0.05 + 1e-12, "{lead:?}");
     }
     assert!(held_back > 50, "{held_back}");
+}
+
+#[test]
+fn a_reference_waits_for_a_hand_that_does_not_turn() {
+    let law = law(two_robots(), |parameters, _| parameters.lead_limit_rad = 0.05);
+    let mut world = ClosedLoop::new(law, 0.0, 0);
+    let stuck = world.hands.front().unwrap()[3];
+    // About the hand itself, which therefore stays in place.
+    let turn = Twist::<Object>::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.3)).expressed_in(&world.X_WA);
+    let p_HA_W = world.X_WA.translation - stuck.translation;
+    world.position_ref.external = world.X_WA.displaced(&turn.shifted(&p_HA_W));
+    for _ in 0..200 {
+        world.tick(true);
+        world.hands.back_mut().unwrap()[3] = stuck;
+        assert!(stuck.displacement_to(&world.out.hands[3].pose).angular.norm() < 0.05 + 1e-12);
+    }
+    assert_eq!(world.out.hands_held_back, 1);
 }

@@ -1,7 +1,7 @@
 //! The critical gain against the characteristic polynomial of the loop.
 
 use core::f64::consts::PI;
-use mikoshi_cooperation::{critical_loop_gain, loop_gain};
+use mikoshi_cooperation::critical_loop_gain;
 use nalgebra::DMatrix;
 
 const FILTER_HZ: f64 = 10.0;
@@ -47,9 +47,4 @@ fn the_loop_is_on_the_edge_of_stability_at_the_critical_gain() {
 fn more_delay_allows_less_gain() {
     let gains: Vec<f64> = (0..40).map(|ticks| critical_loop_gain(ticks, FILTER_HZ, PERIOD_S)).collect();
     assert!(gains.is_sorted_by(|a, b| a > b), "{gains:?}");
-}
-
-#[test]
-fn loop_gain_of_the_weld_is_what_it_was_found_to_be() {
-    assert!((loop_gain(0.05, 1e-4, 25e3) - 0.0625).abs() < 1e-15);
 }

@@ -380,7 +380,17 @@ fn inputs_for_another_number_of_arms_are_rejected() {
     assert_eq!(act(&mut other.law.scratch(), &mut case.law.output()), Err(HybridError::WrongSize));
     assert_eq!(act(&mut chain.law.scratch(), &mut case.law.output()), Err(HybridError::WrongSize));
     assert_eq!(act(&mut case.law.scratch(), &mut other.law.output()), Err(HybridError::WrongSize));
+    let mut without_a_hand = case.law.output();
+    without_a_hand.hands.pop();
+    assert_eq!(act(&mut case.law.scratch(), &mut without_a_hand), Err(HybridError::WrongSize));
     assert_eq!(act(&mut case.law.scratch(), &mut case.law.output()), Ok(()));
+
+    let shorter_chain = Case::new(InternalForces::chain(&team(&[2; 3])));
+    let mut state = chain.state();
+    let mut act =
+        |scratch: &mut _| chain.law.act(&mut state, scratch, &chain.inputs(), &mut chain.law.output());
+    assert_eq!(act(&mut shorter_chain.law.scratch()), Err(HybridError::WrongSize));
+    assert_eq!(act(&mut chain.law.scratch()), Ok(()));
 }
 
 #[test]

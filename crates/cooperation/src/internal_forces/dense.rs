@@ -95,10 +95,6 @@ impl DenseMap {
         self.u.iter().step_by(self.arms).copied().collect()
     }
 
-    pub fn row_stiffness(&self) -> Vec<f64> {
-        self.w_and_c.chunks_exact(self.arms).map(|row| row.iter().map(|c| c * c).sum()).collect()
-    }
-
     pub fn generalized_force<T: Linear>(&self, tips: &[T], rows: &mut [T]) {
         multiply(&self.w_and_c, self.arms, tips, rows);
     }

@@ -128,15 +128,6 @@ impl InternalForces {
         &self.w_inverse
     }
 
-    /// Σ c² of each row of [W; C], n of them: by how much a row's force changes with its position, when
-    /// every hand has unit stiffness against a rigid object. ½ for a pair of arms.
-    pub fn row_stiffness(&self) -> Vec<f64> {
-        match &self.map {
-            Map::Tree(tree) => tree.row_stiffness(),
-            Map::Dense(dense) => dense.row_stiffness(),
-        }
-    }
-
     /// [W; C] (eq. 11), n × n; row 0 is W. Made on demand.
     pub fn w_and_c(&self) -> DMatrix<f64> {
         self.columns(Self::generalized_force)

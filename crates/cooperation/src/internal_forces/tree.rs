@@ -18,8 +18,6 @@ pub(super) struct GroupTree {
 struct Node {
     left: usize,
     right: usize,
-    /// |L| + |R|.
-    arms: f64,
     /// |L| / (|L| + |R|).
     left_share: f64,
     /// |R| / (|L| + |R|).
@@ -38,7 +36,6 @@ impl GroupTree {
             Node {
                 left: groups[&(split.left.start, split.left.end)],
                 right: groups[&(split.right.start, split.right.end)],
-                arms: (split.right.end - split.left.start) as f64,
                 left_share,
                 right_share,
             }
@@ -48,12 +45,6 @@ impl GroupTree {
 
     pub fn work_len(&self) -> usize {
         self.arms + self.nodes.len()
-    }
-
-    /// n for the root's sum; `|L||R|/(|L|+|R|)` for a node.
-    pub fn row_stiffness(&self) -> Vec<f64> {
-        let of_node = |node: &Node| node.left_share * node.right_share * node.arms;
-        core::iter::once(self.arms as f64).chain(self.nodes.iter().map(of_node)).collect()
     }
 
     /// Upwards, sums of groups: a row is `right share · sum of L − left share · sum of R`.
