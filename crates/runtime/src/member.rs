@@ -12,6 +12,10 @@ use std::path::Path;
 /// Ticks that the run may be ahead of a tap that records without loss: half of what its queues hold.
 pub const TAP_LEAD_TICKS: u64 = crate::transport::OBSERVER_DEPTH as u64 / 2;
 
+/// Ticks after which a service looks around even if it never had to sleep: less than a second in real
+/// time, and a few microseconds for each.
+const LOOK_AROUND_TICKS: u64 = 128;
+
 /// Why a process can't take its place.
 #[derive(Debug, thiserror::Error)]
 pub enum JoinError {
@@ -104,7 +108,10 @@ impl Member {
 
     pub(crate) fn begin_tick(&self, tick: u64) -> Result<(), TickError> {
         self.slot().set_tick(tick);
-        if self.board.alarm_is_raised() { self.look_around() } else { Ok(()) }
+        if self.board.alarm_is_raised() || tick % LOOK_AROUND_TICKS == LOOK_AROUND_TICKS - 1 {
+            return self.look_around();
+        }
+        Ok(())
     }
 
     /// Enters a state and waits until all services, and the tap if there is one, have come as far.
