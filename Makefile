@@ -2,6 +2,7 @@
 # suffice. One build profile serves everything, so a clean checkout compiles its dependencies once.
 
 CARGO ?= cargo
+RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
 .DEFAULT_GOAL := help
 .PHONY: help setup build demo test bench lint
 
@@ -17,7 +18,7 @@ build: setup ## Build target/release/mikoshi and the services beside it
 	$(CARGO) build --release --workspace --bins
 
 demo: build ## Four robots hold one object while the internal forces go to zero
-	target/release/mikoshi run config/scenarios/hold.toml
+	$(RELEASE)/mikoshi run config/scenarios/hold.toml
 
 test: build ## Run every test
 	$(CARGO) test --release --workspace

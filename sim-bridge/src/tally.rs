@@ -88,24 +88,19 @@ pub fn count_contacts(
         }
         let geoms = [contact.geom1, contact.geom2].map(|geom| geom as usize);
         let owners = geoms.map(|geom| layout.geoms[geom]);
-        // MuJoCo's contact force is what the first geom does to the second.
-        let on_the_floor = match owners {
-            [GeomOwner::Floor, other] => Some((other, 1.0)),
-            [other, GeomOwner::Floor] => Some((other, -1.0)),
-            _ => None,
-        };
-        match on_the_floor {
-            Some((GeomOwner::Foot { robot, foot }, sign)) => {
+        // Of two geoms MuJoCo names a plane first.
+        match owners {
+            [GeomOwner::Floor, GeomOwner::Foot { robot, foot }] => {
+                // What the first geom does to the second, along the contact's axes, the normal first.
                 let [normal, first, second, spin, first_roll, second_roll] = data.contact_force(index);
-                // The frame's rows are the contact's axes, the normal first.
-                let axes = Matrix3::from_row_slice(&contact.frame).transpose() * sign;
+                let axes = Matrix3::from_row_slice(&contact.frame).transpose();
                 let force = axes * Vector3::new(normal, first, second);
                 let moment = axes * Vector3::new(spin, first_roll, second_roll);
                 tallies[robot].ground_sum[foot] +=
                     Wrench::new(force, moment).shifted(&Vector3::from(contact.pos));
                 continue;
             }
-            Some((GeomOwner::Part { robot }, _)) => tallies[robot].is_on_the_floor = true,
+            [GeomOwner::Floor, GeomOwner::Part { robot }] => tallies[robot].is_on_the_floor = true,
             _ => {}
         }
         count += 1;

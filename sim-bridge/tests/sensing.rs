@@ -83,6 +83,19 @@ fn encoder_rates_are_the_quotients_of_noisy_angles() {
 }
 
 #[test]
+fn no_noise_is_drawn_twice() {
+    let overrides = [("sensors.encoder_noise_rad", "1e-3")];
+    let (truth, noisy) = (readings(&[], 0, 40), readings(&overrides, 0, 40));
+    let pairs = truth
+        .iter()
+        .zip(&noisy)
+        .flat_map(|(a, b)| a.joint_position_rad[..28].iter().zip(&b.joint_position_rad[..28]));
+    let mut noise: Vec<i64> = pairs.map(|(a, b)| ((b - a) * 1e13).round() as i64).collect();
+    noise.sort_unstable();
+    assert!(noise.windows(2).all(|pair| pair[0] != pair[1]));
+}
+
+#[test]
 fn robots_do_not_share_their_noise() {
     let run = standing_team("hold", &[("team", "two"), ("sensors.gyro_noise_rad_s", "1.0")]);
     let mut world = World::new(&run).expect("a world");

@@ -45,6 +45,31 @@ fn four_robots_stand_with_a_sprung_object_and_their_soles_stick() {
 }
 
 #[test]
+fn teams_of_any_size_stand_at_tick_0_and_touch_nothing_but_object_and_ground() {
+    for (team, robots) in [("two", 2), ("three", 3), ("five", 5), ("eight", 8)] {
+        let run = standing_team("hold", &[("team", team)]);
+        let world = World::new(&run).expect("a world");
+        let seen = look(&world);
+        assert_eq!((world.robot_count(), seen.object.robot_count), (robots, robots as u64));
+        let names = seen.object.unintended_pair.map(|geom| world.geom_name((geom as usize).wrapping_sub(1)));
+        assert_eq!(seen.object.unintended_contacts, 0, "{team}: {names:?}");
+        assert!(seen.robots.iter().all(|truth| truth.fallen == 0 && truth.zmp_margin_m > 0.03));
+    }
+}
+
+#[test]
+fn neighbours_in_a_robot_and_a_grasping_hand_with_the_object_may_touch() {
+    let run = standing_team("hold", &[("team", "two")]);
+    let world = World::new(&run).expect("a world");
+    let may_touch =
+        |a: &str, b: &str| world.xml().contains(&format!(r#"<exclude body1="{a}" body2="{b}"/>"#));
+    // Nothing between the waist and the thigh has a shape, though two bodies lie between them.
+    assert!(may_touch("A/BODY", "A/RLEG_JOINT2") && may_touch("B/BODY", "B/CHEST_JOINT1"));
+    assert!(may_touch("A/r_wrist_sensor+", "object"));
+    assert!(!may_touch("A/RARM_JOINT3", "object") && !may_touch("A/RLEG_JOINT2", "A/LLEG_JOINT2"));
+}
+
+#[test]
 fn a_world_starts_where_the_run_says_and_at_rest() {
     let run = standing_team("hold", &[("grasp.offset_m", "0.0")]);
     let seen = look(&World::new(&run).expect("a world"));
