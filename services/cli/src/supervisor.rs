@@ -173,7 +173,10 @@ impl Supervisor {
                 Failure { status: Status::Fault, message: "a service failed and ended well".to_owned() };
             return Outcome::Fault { failure, faults: vec![] };
         };
-        let failed = self.children.processes().iter().filter(has_failed).filter_map(status_of);
+        // The cause first.
+        let others = self.children.processes().iter().filter(has_failed);
+        let others = others.filter(|process| process.service != cause.service);
+        let failed = core::iter::once(cause).chain(others).filter_map(status_of);
         let faults = failed.filter_map(|status| fault_in(run, status)).collect();
         let failure = describe(cause, status_of(cause));
         Outcome::Fault { failure, faults }

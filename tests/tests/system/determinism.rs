@@ -1,0 +1,47 @@
+//! A run is a function of its scenario and its seed, whether in one thread or in a process per service.
+
+use mikoshi_tests::log::Log;
+use mikoshi_tests::run::{Results, run};
+use mikoshi_tests::scenarios::{SHORT, of_project};
+use std::fs;
+
+/// Runs the hold scenario for a moment. It can't meet its thresholds in that time.
+fn hold_for_a_moment(arguments: &[&str]) -> Results {
+    let results = Results::new();
+    let said = run(&of_project("hold"), &[&SHORT, arguments].concat(), &results);
+    assert_eq!(said.status, Some(1), "{said:#?}");
+    results
+}
+
+#[test]
+fn one_thread_and_six_processes_give_the_same_bytes_twice_each() {
+    let reference = hold_for_a_moment(&["--in-process"]);
+    let (log, hash) = (Log::read(&reference.log()), reference.summary()["log_hash"].clone());
+    assert_eq!(log.messages.len(), 200 * (5 * 4 + 2));
+    for arguments in [&["--in-process"][..], &[], &[]] {
+        let other = hold_for_a_moment(arguments);
+        assert_eq!(log.first_difference(&Log::read(&other.log())), None, "{arguments:?}");
+        assert_eq!(other.summary()["log_hash"], hash);
+        let (ours, theirs) = (fs::read(reference.log()), fs::read(other.log()));
+        assert_eq!(ours.expect("a log"), theirs.expect("a log"));
+    }
+}
+
+#[test]
+fn one_flipped_bit_of_one_frame_is_found_and_named() {
+    let log = Log::read(&hold_for_a_moment(&["--in-process"]).log());
+    let place =
+        log.messages.iter().position(|message| message.topic == "joint-command/C" && message.tick == 77);
+    let mut flipped = log.clone();
+    flipped.messages[place.expect("it was recorded")].payload[8 * 64 + 3] ^= 0b100;
+    let difference = log.first_difference(&flipped).expect("it is found");
+    assert_eq!(difference, "joint-command/C of tick 77: joint_velocity_ref_rad_s");
+}
+
+#[test]
+fn another_seed_gives_another_run() {
+    let (one, other) =
+        (hold_for_a_moment(&["--in-process"]), hold_for_a_moment(&["--in-process", "--seed", "1"]));
+    assert_ne!(one.summary()["log_hash"], other.summary()["log_hash"]);
+    assert_eq!(other.summary()["seed"], 1);
+}

@@ -1,0 +1,111 @@
+//! Whatever dies, the run ends, says so, and leaves nothing behind. A run that hangs is a test that hangs.
+
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_tests::run::{Results, Running, is_alive, left_behind, run};
+use mikoshi_tests::scenarios::{ENDLESS, SHORT, of_project};
+use rustix::process::Signal;
+use std::path::PathBuf;
+use std::thread::yield_now;
+
+fn start(results: &Results) -> Running {
+    Running::start(&of_project("hold"), &ENDLESS, results)
+}
+
+fn kill_one(service: ServiceId, name: &str, kind: &str) {
+    let results = Results::new();
+    let running = start(&results);
+    let (directory, services) = (running.directory(), running.services());
+    assert_eq!(services.len(), 6);
+
+    running.signal_service(service, Signal::KILL);
+    let said = running.wait();
+    said.expect_error(3, &[&format!("{name} died in tick "), "SIGKILL"]);
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+    assert_eq!(services.iter().filter(|(_, pid)| is_alive(*pid)).count(), 0);
+
+    let summary = results.summary();
+    assert_eq!(summary["passed"], false);
+    let cause = &summary["faults"][0];
+    assert_eq!((&cause["service"], &cause["code"]), (&kind.into(), &"died".into()), "{summary:#}");
+    assert!(summary["failures"][0].as_str().is_some_and(|text| text.starts_with("the run ended after")));
+}
+
+#[test]
+fn a_bridge_that_is_killed_ends_the_run() {
+    kill_one(ServiceId::Bridge, "bridge", "bridge");
+}
+
+#[test]
+fn a_coordinator_that_is_killed_ends_the_run() {
+    kill_one(ServiceId::Coordinator, "coordinator", "coordinator");
+}
+
+#[test]
+fn a_servo_that_is_killed_ends_the_run() {
+    kill_one(ServiceId::Servo(2), "servo of robot C", "servo");
+}
+
+#[test]
+fn a_frozen_service_does_not_keep_the_run_from_ending() {
+    let results = Results::new();
+    let running = start(&results);
+    let (directory, services) = (running.directory(), running.services());
+    running.signal_service(ServiceId::Servo(0), Signal::STOP);
+    running.signal(Signal::TERM);
+    let said = running.wait();
+    assert_eq!(said.status, Some(143), "{said:#?}");
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+    assert_eq!(services.iter().filter(|(_, pid)| is_alive(*pid)).count(), 0);
+}
+
+#[test]
+fn an_interrupt_ends_all_and_keeps_what_was_recorded() {
+    let results = Results::new();
+    let running = start(&results);
+    let (directory, services) = (running.directory(), running.services());
+    running.signal(Signal::INT);
+    let said = running.wait();
+    said.expect_error(130, &["stopped after "]);
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+    assert_eq!(services.iter().filter(|(_, pid)| is_alive(*pid)).count(), 0);
+    assert!(results.log().exists() && results.summary()["ticks"].as_u64() > Some(0));
+}
+
+#[test]
+fn services_end_with_a_supervisor_that_is_killed_and_the_next_run_cleans_up() {
+    let results = Results::new();
+    let running = start(&results);
+    let (directory, services) = (running.directory(), running.services());
+    running.signal(Signal::KILL);
+    assert_eq!(running.wait().status, None);
+    while services.iter().any(|(_, pid)| is_alive(*pid)) {
+        yield_now();
+    }
+    let said = run(&of_project("hold"), &SHORT, &Results::new());
+    assert_eq!(said.status, Some(1), "{said:#?}");
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn a_second_run_beside_the_first_disturbs_neither() {
+    let (one, other) = (Results::new(), Results::new());
+    let first = start(&one);
+    let second = start(&other);
+    assert_ne!(first.directory(), second.directory());
+    second.signal_service(ServiceId::Bridge, Signal::KILL);
+    second.wait().expect_error(3, &["bridge died"]);
+    assert!(first.services().iter().all(|(_, pid)| is_alive(*pid)));
+    first.signal(Signal::TERM);
+    assert_eq!(first.wait().status, Some(143));
+}
+
+#[test]
+fn a_second_run_into_the_same_folder_is_refused() {
+    let results = Results::new();
+    let running = start(&results);
+    run(&of_project("hold"), &["--force"], &results)
+        .expect_error(2, &["--out", "another run writes its results there"]);
+    running.signal(Signal::TERM);
+    running.wait();
+    run(&of_project("hold"), &[], &results).expect_error(2, &["results of an earlier run", "--force"]);
+}

@@ -1,0 +1,6 @@
+//! Tests of the command as a user meets it.
+
+mod bad_input;
+mod command;
+mod determinism;
+mod faults;
