@@ -2,6 +2,7 @@
 
 use crate::binaries;
 use crate::failure::Failure;
+use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_ipc_types::ServiceId;
 use rustix::process::{Pid, Signal, getpid, getppid, set_parent_process_death_signal};
@@ -10,8 +11,6 @@ use std::io;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::thread::sleep;
-use std::time::Instant;
 
 /// How long processes get to end by themselves.
 const GRACE: Duration = Duration::from_secs(2);
@@ -99,16 +98,16 @@ impl Children {
 
     /// Waits until all have ended, and kills those that have not after a while.
     pub fn end(&mut self) {
-        let deadline = Instant::now() + GRACE;
+        let since_asked = Stopwatch::start();
         loop {
             self.look();
             if self.processes.iter().all(|process| process.ended.is_some()) {
                 return;
             }
-            if Instant::now() >= deadline {
+            if since_asked.elapsed() > GRACE {
                 break;
             }
-            sleep(LOOK);
+            pause(LOOK);
         }
         self.kill();
     }

@@ -19,29 +19,19 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
 
     if let Some(limit) = limits.internal_start_min_n {
         let largest = largest(&summary.internal, |row| row.start_n);
-        if !(largest >= limit) {
+        if largest < limit {
             judge.fail(format!(
                 "internal forces start at no more than {largest:.3} N, expected at least {limit} N"
             ));
         }
     }
-    let is_judged_after_3s = is_judged_after_3s(scenario, summary.sim_time_s);
-    let figures: [(_, _, _, fn(&InternalSummary) -> f64, _); 4] = [
-        ("3 s after the start", "N", limits.internal_after_3s_n, |row| row.after_3s_n, is_judged_after_3s),
-        ("3 s after the start", "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm, is_judged_after_3s),
-        ("at the end", "N", limits.internal_end_n, |row| row.end_n, true),
-        ("at the end", "Nm", limits.internal_end_nm, |row| row.end_nm, true),
-    ];
-    for (when, unit, limit, figure, is_observed) in figures {
-        let Some(limit) = limit else { continue };
-        if is_observed {
-            judge.internal_forces(&summary.internal, when, unit, limit, figure);
-        } else {
-            judge.fail(format!(
-                "internal forces {when}: the run ends before, expected at most {limit} {unit}"
-            ));
-        }
-    }
+    let rows = summary.internal.as_slice();
+    let (when, observed) =
+        ("3 s after the start", is_judged_after_3s(scenario, summary.sim_time_s).then_some(rows));
+    judge.internal_forces(observed, when, "N", limits.internal_after_3s_n, |row| row.after_3s_n);
+    judge.internal_forces(observed, when, "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm);
+    judge.internal_forces(Some(rows), "at the end", "N", limits.internal_end_n, |row| row.end_n);
+    judge.internal_forces(Some(rows), "at the end", "Nm", limits.internal_end_nm, |row| row.end_nm);
 
     let peak = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
     if let Some(limit) = limits.object_position_peak_m {
@@ -96,17 +86,23 @@ impl Judge {
         self.failures.push(what);
     }
 
-    /// One failure for all rows: the largest, and how many there are.
+    /// One failure for all rows: the largest, and how many there are. Rows that were not observed fail.
     fn internal_forces(
         &mut self,
-        rows: &[InternalSummary],
+        observed: Option<&[InternalSummary]>,
         when: &str,
         unit: &str,
-        limit: f64,
+        limit: Option<f64>,
         figure: impl Fn(&InternalSummary) -> f64,
     ) {
+        let Some(limit) = limit else { return };
+        let Some(rows) = observed else {
+            return self.fail(format!(
+                "internal forces {when}: the run ends before, expected at most {limit} {unit}"
+            ));
+        };
         // NaN fails, and is the largest.
-        let failed = || rows.iter().filter(|row| !(figure(row) <= limit));
+        let failed = || rows.iter().filter(|row| figure(row).is_nan() || figure(row) > limit);
         if let Some(largest) = failed().max_by(|a, b| figure(a).total_cmp(&figure(b))) {
             self.fail(format!(
                 "{} of {} internal forces {when}: up to {} ({}), expected at most {limit} {unit}",
@@ -118,15 +114,14 @@ impl Judge {
         }
     }
 
-    // Both are written so that NaN fails.
     fn at_most(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
-        if !(value <= limit) {
+        if value.is_nan() || value > limit {
             self.fail(format!("{what}: {}, expected at most {limit} {unit}", quantity(value, unit)));
         }
     }
 
     fn at_least(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
-        if !(value >= limit) {
+        if value.is_nan() || value < limit {
             self.fail(format!("{what}: {}, expected at least {limit} {unit}", quantity(value, unit)));
         }
     }
@@ -162,13 +157,15 @@ mod tests {
             end_n,
             ..InternalSummary::default()
         });
-        judge.internal_forces(&rows, "at the end", "N", 0.5, |row| row.end_n);
+        judge.internal_forces(Some(&rows), "at the end", "N", Some(0.5), |row| row.end_n);
+        judge.internal_forces(None, "at the end", "N", Some(0.5), |row| row.end_n);
         assert_eq!(
             judge.failures,
             [
                 "a: NaN m, expected at most 1 m",
                 "b: NaN m, expected at least 1 m",
-                "2 of 3 internal forces at the end: up to NaN N (r2), expected at most 0.5 N"
+                "2 of 3 internal forces at the end: up to NaN N (r2), expected at most 0.5 N",
+                "internal forces at the end: the run ends before, expected at most 0.5 N"
             ]
         );
     }

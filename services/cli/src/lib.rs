@@ -24,6 +24,7 @@ mod progress;
 mod report;
 mod supervisor;
 mod table;
+mod wall_clock;
 
 use arguments::{Arguments, Command, RunArguments};
 use clap::Parser;

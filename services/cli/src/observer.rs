@@ -6,10 +6,10 @@ use crate::observed_run::observed_run;
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
 use crate::progress::Progress;
+use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_observation::{Fault, Figures, LogHash, LogWriter, Observation, Summary, Timing, WriteLogError};
-use std::time::Instant;
 
 /// Observes a run: figures, hash, log, progress.
 pub struct RunObserver {
@@ -19,7 +19,7 @@ pub struct RunObserver {
     progress: Progress,
     stamps: Stamps,
     ticks: u64,
-    start: Instant,
+    clock: Stopwatch,
 }
 
 impl RunObserver {
@@ -36,7 +36,7 @@ impl RunObserver {
             progress: Progress::new(run.ticks, run.scenario.control_period_s, is_shown),
             stamps: Stamps::default(),
             ticks: 0,
-            start: Instant::now(),
+            clock: Stopwatch::start(),
         })
     }
 
@@ -64,7 +64,7 @@ impl RunObserver {
     /// # Errors
     /// The log can't be written: [`Status::Fault`](crate::failure::Status::Fault).
     pub fn finish(self, run: &RunSpec, faults: Vec<Fault>) -> Result<Summary, Failure> {
-        let wall_time_s = self.start.elapsed().as_secs_f64();
+        let wall_time_s = self.clock.elapsed().as_secs_f64();
         self.progress.clear();
         self.log.finish().map_err(Failure::fault)?;
         let (figures, scenario) = (self.figures.finish(), &run.scenario);

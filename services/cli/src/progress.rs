@@ -1,8 +1,8 @@
 //! A bar with simulated time and speed, where somebody looks.
 
+use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::time::Instant;
 
 /// Redraws this often: the eye sees no more, and a terminal may be slow.
 const REFRESH_HZ: u8 = 10;
@@ -10,7 +10,7 @@ const REFRESH_HZ: u8 = 10;
 /// How far a run has come. Draws nothing where standard error is no terminal.
 pub struct Progress {
     bar: ProgressBar,
-    start: Instant,
+    clock: Stopwatch,
     period_s: f64,
     sim_time_s: f64,
 }
@@ -27,7 +27,7 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(ticks), target).with_style(style);
         bar.set_message("starting");
         bar.tick();
-        Self { bar, start: Instant::now(), period_s, sim_time_s: ticks as f64 * period_s }
+        Self { bar, clock: Stopwatch::start(), period_s, sim_time_s: ticks as f64 * period_s }
     }
 
     /// This many ticks are done.
@@ -35,7 +35,7 @@ impl Progress {
         if self.bar.is_hidden() {
             return;
         }
-        let (sim_time_s, wall_time) = (ticks as f64 * self.period_s, self.start.elapsed());
+        let (sim_time_s, wall_time) = (ticks as f64 * self.period_s, self.clock.elapsed());
         // A speed over less than this is noise.
         let speed =
             if wall_time < Duration::from_millis(200) { 0.0 } else { sim_time_s / wall_time.as_secs_f64() };

@@ -9,6 +9,7 @@ use crate::observer::RunObserver;
 use crate::outcome::{Outcome, fault_of, label_of, robot_name};
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
+use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_observation::{Fault, Observation, TeamTap};
@@ -19,8 +20,6 @@ use mikoshi_runtime::{
 };
 use std::fs;
 use std::path::Path;
-use std::thread::sleep;
-use std::time::Instant;
 
 /// How often the supervisor looks around. The tap's queues hold many times what a run makes of it.
 const LOOK: Duration = Duration::from_millis(1);
@@ -92,7 +91,7 @@ impl Supervisor {
     }
 
     fn watch(&mut self, prepared: &Prepared, observer: &mut RunObserver, interrupts: &Interrupts) -> Watched {
-        let mut last_progress = Instant::now();
+        let mut since_progress = Stopwatch::start();
         let mut observation = Observation::for_team(prepared.run.robots.len());
         let mut is_started = false;
         loop {
@@ -107,7 +106,7 @@ impl Supervisor {
                         return Watched::Unobservable(Failure::fault(error));
                     }
                     self.tap.set_consumed(observer.ticks());
-                    last_progress = Instant::now();
+                    since_progress = Stopwatch::start();
                     if observer.ticks() == prepared.run.ticks {
                         return Watched::All;
                     }
@@ -127,10 +126,10 @@ impl Supervisor {
             if self.children.look() || self.any_service_is(State::Failed) {
                 return Watched::Lost;
             }
-            if last_progress.elapsed() > STALL {
+            if since_progress.elapsed() > STALL {
                 return Watched::Stalled;
             }
-            sleep(LOOK);
+            pause(LOOK);
         }
     }
 
