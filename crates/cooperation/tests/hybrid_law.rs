@@ -383,6 +383,9 @@ fn inputs_for_another_number_of_arms_are_rejected() {
     let mut without_a_hand = case.law.output();
     without_a_hand.hands.pop();
     assert_eq!(act(&mut case.law.scratch(), &mut without_a_hand), Err(HybridError::WrongSize));
+    let mut without_a_row = case.law.output();
+    without_a_row.force.internal.pop();
+    assert_eq!(act(&mut case.law.scratch(), &mut without_a_row), Err(HybridError::WrongSize));
     assert_eq!(act(&mut case.law.scratch(), &mut case.law.output()), Ok(()));
 
     let shorter_chain = Case::new(InternalForces::chain(&team(&[2; 3])));
