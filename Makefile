@@ -9,7 +9,7 @@ RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-setup: ## Fetch MuJoCo's library (once) into .mujoco/lib
+setup: ## Fetch MuJoCo's library (once) into .mujoco/run-make-setup
 	@command -v $(CARGO) >/dev/null || { echo "make: cargo is missing: see https://rustup.rs" >&2; exit 1; }
 	@command -v cc >/dev/null || { echo "make: a C compiler (cc) is missing" >&2; exit 1; }
 	@scripts/setup-mujoco

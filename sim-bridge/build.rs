@@ -22,6 +22,6 @@ fn main() {
         return;
     }
     println!("cargo::rustc-link-arg=-Wl,-rpath,{directory}");
-    // For a checkout that was moved after it was built: target/release/BINARY and .mujoco/lib.
-    println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/../../.mujoco/lib");
+    // For a checkout that was moved after it was built, seen from target/release.
+    println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/../../.mujoco/run-make-setup");
 }
