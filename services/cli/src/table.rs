@@ -40,6 +40,6 @@ mod tests {
     fn numbers_stand_below_each_other_and_no_line_ends_in_blanks() {
         let table =
             of_numbers(&["row", "N"], [vec!["a".into(), "1.5".into()], vec!["b".into(), "10.5".into()]]);
-        assert_eq!(table, " row     N\n────────────\n a     1.5\n b    10.5\n");
+        assert_eq!(table, " row      N\n────────────\n a      1.5\n b     10.5\n");
     }
 }
