@@ -355,7 +355,12 @@ proptest! {
     fn whatever_is_measured_offsets_stay_bounded_and_the_zmp_within_the_soles(
         inputs in proptest::collection::vec(any_inputs(), 1..60),
     ) {
-        let config = StabiliserConfig { com_admittance_1_s2: 50.0, ..config() };
+        let config = StabiliserConfig {
+            com_admittance_1_s2: 50.0,
+            ankle_max_rad: 2e-3,
+            height_difference_max_m: 2e-4,
+            ..config()
+        };
         let (stabiliser, mut state) = (Stabiliser::new(config), StabiliserState::default());
         for inputs in inputs {
             let out = assert_no_alloc(|| stabiliser.act(&mut state, &inputs));
