@@ -32,7 +32,9 @@ impl ForceGains {
     ///
     /// The object is free, so it takes the place where the hands' wrenches balance. The share is then a
     /// quotient of two quadratic forms of the hands' wrenches, with k_z k_h above and 1/k below, and lies
-    /// between the smallest and the largest k_z k_h k, whatever the grasp and the team.
+    /// between the smallest and the largest k_z k_h k, whatever the grasp and the team. (With some internal
+    /// axes under position control that holds for equal k_h k only, as [`ForceGains::of_loop_gain`] makes
+    /// them.)
     pub fn loop_gain(&self, kz: f64, stiffness: HandStiffness) -> f64 {
         kz * f64::max(self.m_n * stiffness.n_m, self.rad_nm * stiffness.nm_rad)
     }
