@@ -82,6 +82,14 @@ fn early_contact_freezes_the_foot_where_it_felt_the_ground() {
 }
 
 #[test]
+fn a_foot_that_has_landed_has_no_velocity() {
+    let swing = Swing { contact: SwingContact::Landed { at: to() }, ..Swing::new(from(), to()) };
+    let (pose, twist) = swing.foot(&config(), 0.8, DURATION);
+    assert_eq!(pose, to().in_world());
+    assert_eq!(twist.to_vector().norm(), 0.0);
+}
+
+#[test]
 fn force_before_the_foot_comes_down_is_no_landing() {
     let contacts = swing(|tick| if tick < 60 { 300.0 } else { 0.0 }, TICKS);
     assert!(contacts.iter().all(|contact| matches!(contact, SwingContact::Swinging { .. })));

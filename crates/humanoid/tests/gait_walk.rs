@@ -347,6 +347,33 @@ fn both_feet_are_judged_by_the_stopping_threshold_after_the_next_landing() {
 }
 
 #[test]
+fn a_mirrored_robot_does_under_the_mirrored_clock_what_the_other_one_does() {
+    let config = GaitConfig::standard(soles());
+    let mut plain = Robot::standing_at(GroundPose::default(), config);
+    let mut mirrored = Robot::standing_at(GroundPose::default(), GaitConfig { mirrored: true, ..config });
+    let mut clock =
+        StepClock::Stepping { step_index: 0, tick_in_step: 0, swing: Side::Left, will_continue: true };
+    for tick in 0..600 {
+        let velocity = Vector2::new(0.1, 0.03) * f64::from(tick < 200);
+        for robot in [&mut plain, &mut mirrored] {
+            robot.centre.velocity = velocity;
+            robot.centre.pose.position += velocity * DT;
+        }
+        let StepClock::Stepping { step_index, tick_in_step, swing, will_continue } = clock else { break };
+        let opposite =
+            StepClock::Stepping { step_index, tick_in_step, swing: swing.opposite(), will_continue };
+        assert_eq!(plain.act(clock), mirrored.act(opposite), "tick {tick}");
+        let (wish, other) = (plain.wish(), mirrored.wish());
+        assert_eq!(wish, StepWish { first_swing: other.first_swing.opposite(), ..other }, "tick {tick}");
+        // As a team of one that always takes another step.
+        clock = clock.extrapolated(&config.timing, 1);
+        if let StepClock::Stepping { will_continue, .. } = &mut clock {
+            *will_continue = true;
+        }
+    }
+}
+
+#[test]
 fn from_any_tick_a_robot_left_alone_comes_to_stand_on_two_feet() {
     let mut team = Team::around_an_object(GaitConfig::standard(soles()));
     let timing = team.robots[0].gait.config().timing;
