@@ -11,7 +11,7 @@ use mikoshi_runtime::{Call, ConnectError, Loan, Participant, Publisher, Subscrib
 #[allow(missing_docs)]
 pub enum BuildServoError {
     #[error("robot {robot}: {source}")]
-    Robot { robot: String, source: BuildRobotError },
+    Robot { robot: String, source: Box<BuildRobotError> },
     #[error("{0}")]
     Connect(#[from] ConnectError),
 }
@@ -39,7 +39,7 @@ impl<T: Transport> ServoParticipant<T> {
     pub fn new(run: &RunSpec, index: usize, transport: &T) -> Result<Self, BuildServoError> {
         let servo = Servo::new(run, index).map_err(|source| BuildServoError::Robot {
             robot: run.robots[index].member.name.clone(),
-            source,
+            source: Box::new(source),
         })?;
         Ok(Self {
             index,
