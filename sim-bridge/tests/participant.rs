@@ -73,16 +73,14 @@ fn a_bridge_publishes_its_world_and_steps_it_by_all_commands() {
 
 #[test]
 fn a_robot_that_stalls_or_sends_nan_or_an_old_frame_ends_the_run_before_physics() {
-    let silent = |scene: &mut Scene, _: JointCommand| {
-        let _ = scene;
-    };
+    let silent = |_: &mut Scene, _: JointCommand| {};
     let nan = |scene: &mut Scene, mut command: JointCommand| {
         command.joint_position_ref_rad[3] = f64::NAN;
         scene.command(1, 0, command);
     };
     let future = |scene: &mut Scene, command: JointCommand| scene.command(1, 7, command);
-    let faults: [(&str, &dyn Fn(&mut Scene, JointCommand)); 3] =
-        [("silent", &silent), ("nan", &nan), ("future", &future)];
+    type Fault<'a> = &'a dyn Fn(&mut Scene, JointCommand);
+    let faults: [(&str, Fault); 3] = [("silent", &silent), ("nan", &nan), ("future", &future)];
     for (name, fault) in faults {
         let mut scene = Scene::new();
         let command = constant_commands(&scene.run)[0];
