@@ -27,11 +27,19 @@ fn every_robot_stands_on_its_soles_and_holds_what_it_should() {
         kinematics.update(&model, &X_WB, &robot.initial_posture_rad);
 
         let (yaw, member) = (robot.member.yaw_deg.to_radians(), &robot.member);
-        for foot in &robot.config.feet {
+        for (foot, side) in robot.config.feet.iter().zip([-0.5, 0.5]) {
             let sole = model.find_frame(&foot.sole_link).expect("it is there");
             let X_WF: Pose<World, Foot> = kinematics.frame_pose(&model, sole);
             assert!(X_WF.translation.z.abs() < 1e-3, "{} stands at {}", member.name, X_WF.translation.z);
             assert!((X_WF.rotation.angle() - yaw.abs()).abs() < 1e-3);
+            let aside_m = side * robot.config.foot_spacing_m;
+            let expected = [member.x_m - aside_m * yaw.sin(), member.y_m + aside_m * yaw.cos()];
+            let [x, y] = [X_WF.translation.x, X_WF.translation.y];
+            assert!(
+                (x - expected[0]).abs() < 1e-3 && (y - expected[1]).abs() < 1e-3,
+                "{}: {x} {y}",
+                member.name
+            );
         }
         let com = kinematics.com();
         assert!((com.x - member.x_m).abs() < 1e-3 && (com.y - member.y_m).abs() < 1e-3);

@@ -20,7 +20,16 @@ fn help_names_every_command_and_every_exit_status() {
         assert!(said.out.contains(command), "{said:#?}");
     }
     let said = say_mikoshi(["run", "--help"]);
-    for text in ["--in-process", "--seed", "--set", "--out", "0  ", "1  ", "2  ", "3  "] {
+    for text in [
+        "--in-process",
+        "--seed",
+        "--set",
+        "--out",
+        "\n  0  the run",
+        "\n  1  it did",
+        "\n  2  bad",
+        "\n  3  a fault",
+    ] {
         assert!(said.out.contains(text), "no {text:?} in {said:#?}");
     }
 }
