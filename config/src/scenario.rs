@@ -52,6 +52,11 @@ impl Scenario {
         (self.duration_s / self.control_period_s).round() as u64
     }
 
+    /// Tick at which the hybrid law starts; `None` if it never does.
+    pub fn hybrid_start_tick(&self) -> Option<u64> {
+        self.hybrid.start_s.map(|start_s| (start_s / self.control_period_s).round() as u64)
+    }
+
     /// Number of physics steps in a tick.
     pub fn substeps(&self) -> u64 {
         (self.control_period_s / self.physics.step_s).round() as u64

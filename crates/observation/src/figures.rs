@@ -237,9 +237,9 @@ impl ObjectFigures {
         let X_WA = *X_WBody * X_BodyA;
         self.samples += 1;
         let error = X_WA_ref.displacement_to(&X_WA).to_array();
-        for axis in 0..6 {
-            self.squares[axis] += error[axis] * error[axis];
-            self.peaks[axis] = self.peaks[axis].max(error[axis].abs());
+        for ((square, peak), error) in self.squares.iter_mut().zip(&mut self.peaks).zip(error) {
+            *square += error * error;
+            *peak = peak.max(error.abs());
         }
         X_WA
     }

@@ -15,11 +15,10 @@ pub fn observed_run(prepared: &Prepared) -> Result<ObservedRun, Failure> {
     let (run, internal_forces) = (&prepared.run, prepared.law.internal_forces());
     let c = internal_forces.c();
     let names = internal_forces.names().iter().skip(1).cloned();
-    let period_s = run.scenario.control_period_s;
     Ok(ObservedRun {
-        control_period_s: period_s,
+        control_period_s: run.scenario.control_period_s,
         ticks: run.ticks,
-        hybrid_start_tick: run.scenario.hybrid.start_s.map(|start_s| (start_s / period_s).round() as u64),
+        hybrid_start_tick: run.scenario.hybrid_start_tick(),
         robots: run.robots.iter().map(observed_robot).collect::<Result<_, _>>()?,
         internal_rows: names.zip(c.row_iter().map(|row| row.iter().copied().collect())).collect(),
     })

@@ -71,17 +71,16 @@ pub fn build_hybrid_law(run: &RunSpec) -> Result<HybridLaw, BuildCoordinatorErro
 }
 
 /// The virtual sticks of all hands, in hand order, as the run's description has the grasp.
-pub fn virtual_sticks(run: &RunSpec) -> Result<Vec<VirtualStick>, BuildCoordinatorError> {
-    let stick = |robot: &RobotSpec, hand: usize, X_AH: &[f64; 7]| {
-        let X_AH = Pose::<Object, Hand>::from_array(X_AH)
-            .ok_or_else(|| BuildCoordinatorError::HandPose { robot: robot.member.name.clone(), hand })?;
-        Ok(VirtualStick::from_hand_in_object(&X_AH))
-    };
-    let of_robot = |robot| {
-        let hands: &RobotSpec = robot;
-        hands.hand_in_object.iter().enumerate().map(move |(hand, X_AH)| stick(hands, hand, X_AH))
-    };
-    run.robots.iter().flat_map(of_robot).collect()
+pub(crate) fn virtual_sticks(run: &RunSpec) -> Result<Vec<VirtualStick>, BuildCoordinatorError> {
+    let mut sticks = vec![];
+    for robot in &run.robots {
+        for (hand, X_AH) in robot.hand_in_object.iter().enumerate() {
+            let X_AH = Pose::<Object, Hand>::from_array(X_AH)
+                .ok_or_else(|| BuildCoordinatorError::HandPose { robot: robot.member.name.clone(), hand })?;
+            sticks.push(VirtualStick::from_hand_in_object(&X_AH));
+        }
+    }
+    Ok(sticks)
 }
 
 fn build_selection(

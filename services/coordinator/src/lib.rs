@@ -12,6 +12,6 @@ mod participant;
 mod reference;
 mod tick;
 
-pub use build::{BuildCoordinatorError, build_hybrid_law, build_internal_forces, team_arms, virtual_sticks};
+pub use build::{BuildCoordinatorError, build_hybrid_law, build_internal_forces, team_arms};
 pub use participant::CoordinatorParticipant;
 pub use tick::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState};

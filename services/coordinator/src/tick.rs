@@ -77,11 +77,10 @@ impl Coordinator {
     pub fn new(run: &RunSpec) -> Result<Self, BuildCoordinatorError> {
         let law = build_hybrid_law(run)?;
         let references = References::new(&run.scenario, law.internal_forces())?;
-        let period_s = run.scenario.control_period_s;
         Ok(Self {
             law,
             references,
-            hybrid_start_tick: run.scenario.hybrid.start_s.map(|start_s| (start_s / period_s).round() as u64),
+            hybrid_start_tick: run.scenario.hybrid_start_tick(),
             hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
             sticks: virtual_sticks(run)?,
         })
