@@ -22,6 +22,11 @@ pub mod mode {
     pub const HYBRID: u64 = 2;
     /// A fault ended the run: every command is constant.
     pub const SAFE_STOP: u64 = 3;
+
+    /// Whether the hybrid law is at work.
+    pub const fn is_hybrid(mode: u64) -> bool {
+        mode == HYBRID
+    }
 }
 
 /// Bits of `RobotState::flags`.

@@ -2,9 +2,9 @@
 
 use crate::canonical::Observation;
 use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
-use mikoshi_cooperation::VirtualStick;
+use crate::truth::{ObjectTracker, TrackedObject, is_loaded};
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotTruth, TeamState, mode};
-use mikoshi_spatial::{Hand, Object, Pose, World, Wrench};
+use mikoshi_spatial::{Object, Pose, World, Wrench};
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
 
@@ -14,8 +14,6 @@ const JUDGED_AFTER_S: f64 = 3.0;
 const WINDOW_S: f64 = 0.2;
 /// Length of the window in which measured and true internal forces are compared.
 const COMPARED_S: f64 = 1.0;
-/// A sole is set down while it bears more than this share of the robot's weight.
-const LOADED_SHARE: f64 = 0.05;
 const GRAVITY_M_S2: f64 = 9.81;
 
 /// What must be known of a robot to judge it.
@@ -61,7 +59,7 @@ pub struct ObservedRun {
 pub struct Figures {
     run: ObservedRun,
     internal: Vec<InternalSummary>,
-    sticks: Vec<VirtualStick>,
+    tracker: ObjectTracker,
     end_samples: u64,
     measurement_error: (f64, f64),
     object: ObjectFigures,
@@ -92,9 +90,9 @@ impl Figures {
             .collect();
         let robots = run.robots.iter().map(RobotFigures::new).collect();
         Self {
+            tracker: ObjectTracker::new(&run),
             run,
             internal,
-            sticks: Vec::new(),
             end_samples: 0,
             measurement_error: (0.0, 0.0),
             object: ObjectFigures::default(),
@@ -105,13 +103,12 @@ impl Figures {
 
     /// Takes in one tick. Ticks come in order.
     pub fn observe(&mut self, observation: &Observation) {
-        let tick = observation.tick();
-        let Some(X_WBody) = Pose::<World, Object>::from_array(&observation.object_truth.payload.pose) else {
+        let Some(object) = self.tracker.observe(observation) else {
             return;
         };
+        self.object.observe(&object);
         let team_state = &observation.team_state.payload;
-        let X_WA = self.object.observe(&X_WBody, team_state, self.run.hybrid_start_tick.is_none());
-        self.observe_internal_forces(tick, &X_WA, observation);
+        self.observe_internal_forces(observation.tick(), &object.internal, team_state);
         for (figures, truth) in self.robots.iter_mut().zip(&observation.robot_truth) {
             figures.observe(&truth.payload);
         }
@@ -120,44 +117,17 @@ impl Figures {
         }
     }
 
-    /// True wrenches at the tips of the virtual sticks, in hand order (eq. A1). The sticks are those of the
-    /// true hands when the law started; before, they lead to the object's frame as it is.
-    fn tip_wrenches(&mut self, X_WA: &Pose<World, Object>, observation: &Observation) -> Vec<Wrench<World>> {
-        let is_hybrid = observation.team_state.payload.team_mode == mode::HYBRID;
-        let hands = self.run.robots.iter().zip(&observation.robot_truth).flat_map(|(robot, truth)| {
-            truth.payload.hand_pose.iter().zip(&truth.payload.hand_wrench).take(robot.hands)
-        });
-        let hands = hands.map(|(pose, wrench)| {
-            let X_WH = Pose::<World, Hand>::from_array(pose).unwrap_or_else(Pose::identity);
-            (X_WH, Wrench::<World>::from_array(wrench))
-        });
-        let hands: Vec<_> = hands.collect();
-        if is_hybrid && self.sticks.is_empty() {
-            self.sticks = hands.iter().map(|(X_WH, _)| VirtualStick::at_grasp(X_WH, X_WA)).collect();
-        }
-        let stick = |hand: usize, X_WH: &Pose<World, Hand>| {
-            self.sticks.get(hand).copied().unwrap_or_else(|| VirtualStick::at_grasp(X_WH, X_WA))
-        };
-        hands.iter().enumerate().map(|(i, (X_WH, wrench))| stick(i, X_WH).tip_wrench(X_WH, wrench)).collect()
-    }
-
-    /// Generalized internal forces from the true wrenches: eqs. 11 and 28.
-    fn observe_internal_forces(&mut self, tick: u64, X_WA: &Pose<World, Object>, observation: &Observation) {
-        let tips = self.tip_wrenches(X_WA, observation);
+    fn observe_internal_forces(&mut self, tick: u64, forces: &[Wrench<Object>], team_state: &TeamState) {
         let seconds = |s: f64| (s / self.run.control_period_s).round() as u64;
         let start = self.run.hybrid_start_tick.unwrap_or(0);
         let judged = start + seconds(JUDGED_AFTER_S)..=start + seconds(JUDGED_AFTER_S + WINDOW_S);
         let is_end = tick + seconds(WINDOW_S) >= self.run.ticks;
-        let is_compared = tick + seconds(COMPARED_S) >= self.run.ticks
-            && observation.team_state.payload.team_mode == mode::HYBRID;
+        let is_compared =
+            tick + seconds(COMPARED_S) >= self.run.ticks && mode::is_hybrid(team_state.team_mode);
         if is_end {
             self.end_samples += 1;
         }
-        for (row, (summary, (_, coefficients))) in
-            self.internal.iter_mut().zip(&self.run.internal_rows).enumerate()
-        {
-            let force_W = tips.iter().zip(coefficients).fold(Wrench::zero(), |sum, (tip, c)| sum + *tip * *c);
-            let force_A: Wrench<Object> = force_W.expressed_in(&X_WA.inverse());
+        for (row, (summary, force_A)) in self.internal.iter_mut().zip(forces).enumerate() {
             let (force_n, moment_nm) = (force_A.force.norm(), force_A.moment.norm());
             let raise = |largest: &mut f64, value: f64| *largest = largest.max(value);
             if tick >= start {
@@ -179,8 +149,8 @@ impl Figures {
                 }
             }
             if is_compared {
-                let measured = observation.team_state.payload.generalized_force[row + 1];
-                let error = Wrench::<Object>::from_array(&measured) - force_A;
+                let measured = team_state.generalized_force[row + 1];
+                let error = Wrench::<Object>::from_array(&measured) - *force_A;
                 raise(&mut self.measurement_error.0, error.force.norm());
                 raise(&mut self.measurement_error.1, error.moment.norm());
             }
@@ -194,7 +164,7 @@ impl Figures {
         }
         let robots = self.run.robots.iter().zip(&self.robots);
         JudgedFigures {
-            object: self.object.finish(),
+            object: self.object.finish(self.tracker.X_BodyA()),
             internal: self.internal,
             internal_measurement_error_n: self.measurement_error.0,
             internal_measurement_error_nm: self.measurement_error.1,
@@ -209,42 +179,27 @@ impl Figures {
 struct ObjectFigures {
     first: Option<Pose<World, Object>>,
     last: Option<Pose<World, Object>>,
-    /// Σa in the body of the object: where control has it when it starts to follow a reference. The paper
-    /// lets it be anywhere on the object, and creates it with the virtual sticks.
-    X_BodyA: Option<Pose<Object, Object>>,
     samples: u64,
     squares: [f64; 6],
     peaks: [f64; 6],
 }
 
 impl ObjectFigures {
-    /// Takes in the object's true pose, and returns that of Σa. Without a law to follow, `is_uncontrolled`,
-    /// there is no Σa but the body's own frame.
-    fn observe(
-        &mut self,
-        X_WBody: &Pose<World, Object>,
-        team_state: &TeamState,
-        is_uncontrolled: bool,
-    ) -> Pose<World, Object> {
-        self.first.get_or_insert(*X_WBody);
-        self.last = Some(*X_WBody);
-        let reference = Pose::<World, Object>::from_array(&team_state.object_pose_ref);
-        let is_judged = is_uncontrolled || team_state.team_mode == mode::HYBRID;
-        let Some(X_WA_ref) = reference.filter(|_| is_judged) else {
-            return *X_WBody;
+    fn observe(&mut self, object: &TrackedObject) {
+        self.first.get_or_insert(object.X_WBody);
+        self.last = Some(object.X_WBody);
+        let Some(X_WA_ref) = object.X_WA_ref else {
+            return;
         };
-        let X_BodyA = *self.X_BodyA.get_or_insert_with(|| X_WBody.inverse() * X_WA_ref);
-        let X_WA = *X_WBody * X_BodyA;
         self.samples += 1;
-        let error = X_WA_ref.displacement_to(&X_WA).to_array();
+        let error = X_WA_ref.displacement_to(&object.X_WA).to_array();
         for ((square, peak), error) in self.squares.iter_mut().zip(&mut self.peaks).zip(error) {
             *square += error * error;
             *peak = peak.max(error.abs());
         }
-        X_WA
     }
 
-    fn finish(&self) -> ObjectSummary {
+    fn finish(&self, X_BodyA: Option<&Pose<Object, Object>>) -> ObjectSummary {
         let rms = self.squares.map(|sum| (sum / self.samples.max(1) as f64).sqrt());
         let travel = match (&self.first, &self.last) {
             (Some(first), Some(last)) => first.displacement_to(last).to_array(),
@@ -261,7 +216,7 @@ impl ObjectFigures {
             attitude_peak_rad,
             travel_m,
             travel_rad,
-            frame_offset_m: self.X_BodyA.map_or([0.0; 3], |X_BodyA| X_BodyA.translation.into()),
+            frame_offset_m: X_BodyA.map_or([0.0; 3], |X_BodyA| X_BodyA.translation.into()),
         }
     }
 }
@@ -315,7 +270,7 @@ impl RobotFigures {
         }
         for foot in 0..MAX_FEET {
             let position = Vector2::new(truth.sole_pose[foot][0], truth.sole_pose[foot][1]);
-            let is_loaded = truth.ground_wrench[foot][2] > LOADED_SHARE * self.weight_n;
+            let is_loaded = is_loaded(truth, foot, self.weight_n);
             match self.touchdown[foot] {
                 Some(touchdown) if is_loaded => {
                     self.foot_slip_max_m = self.foot_slip_max_m.max((position - touchdown).norm());

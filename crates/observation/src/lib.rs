@@ -9,9 +9,11 @@ mod figures;
 mod log;
 mod summary;
 mod tap;
+mod truth;
 
 pub use canonical::{LogHash, Observation, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use log::{LogWriter, WriteLogError};
 pub use summary::{Fault, InternalSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
 pub use tap::TeamTap;
+pub use truth::{ObjectTracker, TrackedObject, is_loaded};

@@ -1,0 +1,115 @@
+//! Where the object truly is and what is truly in it, seen through the frames that control creates when it
+//! starts.
+
+use crate::canonical::Observation;
+use crate::figures::ObservedRun;
+use mikoshi_cooperation::VirtualStick;
+use mikoshi_ipc_types::{RobotTruth, mode};
+use mikoshi_spatial::{Hand, Object, Pose, World, Wrench};
+
+/// A sole is set down while it bears more than this share of the robot's weight.
+const LOADED_SHARE: f64 = 0.05;
+
+/// Whether a foot is set down.
+pub fn is_loaded(truth: &RobotTruth, foot: usize, weight_n: f64) -> bool {
+    truth.ground_wrench.get(foot).is_some_and(|wrench| wrench[2] > LOADED_SHARE * weight_n)
+}
+
+/// Follows the object through a run, by ground truth. Ticks come in order.
+#[derive(Clone, Debug)]
+pub struct ObjectTracker {
+    /// Grasping hands of each robot.
+    hands: Vec<usize>,
+    /// Coefficients of each internal force: the rows of C.
+    c: Vec<Vec<f64>>,
+    /// Without a law to follow there is no Σa but the body's own frame.
+    is_uncontrolled: bool,
+    X_BodyA: Option<Pose<Object, Object>>,
+    sticks: Vec<VirtualStick>,
+}
+
+/// The object in one tick.
+#[derive(Clone, Debug)]
+pub struct TrackedObject {
+    /// The object's body.
+    pub X_WBody: Pose<World, Object>,
+    /// Σa, fixed to the body where control had it when it started to follow a reference; before, the body's
+    /// own frame. The paper lets it be anywhere on the object, and creates it with the virtual sticks.
+    pub X_WA: Pose<World, Object>,
+    /// What Σa is asked to follow, while it is.
+    pub X_WA_ref: Option<Pose<World, Object>>,
+    /// Generalized internal forces from the true, unfiltered wrenches, in the object's axes: eqs. 11, 28.
+    pub internal: Vec<Wrench<Object>>,
+}
+
+impl ObjectTracker {
+    /// Nothing observed yet.
+    pub fn new(run: &ObservedRun) -> Self {
+        Self {
+            hands: run.robots.iter().map(|robot| robot.hands).collect(),
+            c: run.internal_rows.iter().map(|(_, coefficients)| coefficients.clone()).collect(),
+            is_uncontrolled: run.hybrid_start_tick.is_none(),
+            X_BodyA: None,
+            sticks: Vec::new(),
+        }
+    }
+
+    /// Takes in one tick; none if the object's pose is no pose.
+    pub fn observe(&mut self, observation: &Observation) -> Option<TrackedObject> {
+        let X_WBody = Pose::<World, Object>::from_array(&observation.object_truth.payload.pose)?;
+        let team_state = &observation.team_state.payload;
+        let is_hybrid = mode::is_hybrid(team_state.team_mode);
+        let X_WA_ref = Pose::<World, Object>::from_array(&team_state.object_pose_ref)
+            .filter(|_| is_hybrid || self.is_uncontrolled);
+        let X_WA = match X_WA_ref {
+            Some(X_WA_ref) => X_WBody * *self.X_BodyA.get_or_insert_with(|| X_WBody.inverse() * X_WA_ref),
+            None => X_WBody,
+        };
+        let internal = self.internal_forces(&X_WA, is_hybrid, observation);
+        Some(TrackedObject { X_WBody, X_WA, X_WA_ref, internal })
+    }
+
+    /// Σa in the body of the object, once there is one.
+    pub fn X_BodyA(&self) -> Option<&Pose<Object, Object>> {
+        self.X_BodyA.as_ref()
+    }
+
+    fn internal_forces(
+        &mut self,
+        X_WA: &Pose<World, Object>,
+        is_hybrid: bool,
+        observation: &Observation,
+    ) -> Vec<Wrench<Object>> {
+        let tips = self.tip_wrenches(X_WA, is_hybrid, observation);
+        let row = |coefficients: &Vec<f64>| {
+            let force_W = tips.iter().zip(coefficients).fold(Wrench::zero(), |sum, (tip, c)| sum + *tip * *c);
+            force_W.expressed_in(&X_WA.inverse())
+        };
+        self.c.iter().map(row).collect()
+    }
+
+    /// True wrenches at the tips of the virtual sticks, in hand order (eq. A1). The sticks are those of the
+    /// true hands when the law started; before, they lead to the object's frame as it is.
+    fn tip_wrenches(
+        &mut self,
+        X_WA: &Pose<World, Object>,
+        is_hybrid: bool,
+        observation: &Observation,
+    ) -> Vec<Wrench<World>> {
+        let hands = self.hands.iter().zip(&observation.robot_truth).flat_map(|(hands, truth)| {
+            truth.payload.hand_pose.iter().zip(&truth.payload.hand_wrench).take(*hands)
+        });
+        let hands = hands.map(|(pose, wrench)| {
+            let X_WH = Pose::<World, Hand>::from_array(pose).unwrap_or_else(Pose::identity);
+            (X_WH, Wrench::<World>::from_array(wrench))
+        });
+        let hands: Vec<_> = hands.collect();
+        if is_hybrid && self.sticks.is_empty() {
+            self.sticks = hands.iter().map(|(X_WH, _)| VirtualStick::at_grasp(X_WH, X_WA)).collect();
+        }
+        let stick = |hand: usize, X_WH: &Pose<World, Hand>| {
+            self.sticks.get(hand).copied().unwrap_or_else(|| VirtualStick::at_grasp(X_WH, X_WA))
+        };
+        hands.iter().enumerate().map(|(i, (X_WH, wrench))| stick(i, X_WH).tip_wrench(X_WH, wrench)).collect()
+    }
+}
