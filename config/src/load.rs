@@ -94,13 +94,15 @@ pub fn load_robot(dir: &Path, model: &str) -> Result<LoadedRobot, LoadConfigErro
         problem,
     })?;
     let document = Node::read(&path)?;
-    let config: RobotConfig = decode(&document)?;
+    let mut config: RobotConfig = decode(&document)?;
     refuse(&document, validate::robot(&config, model))?;
-    for (name, folder) in &config.packages {
-        if !dir.join(folder).is_dir() {
+    for (name, folder) in &mut config.packages {
+        // Absolute: every process of a run finds the same meshes, wherever it was started.
+        let found = std::path::absolute(dir.join(&folder)).ok().filter(|found| found.is_dir());
+        *folder = found.and_then(|found| found.into_os_string().into_string().ok()).ok_or_else(|| {
             let problem = format!("found {folder:?}, expected a folder beside this file");
-            return Err(document.key_error(&format!("packages.{name}"), problem).into());
-        }
+            document.key_error(&format!("packages.{name}"), problem)
+        })?;
     }
     let urdf_path = dir.join(&config.urdf);
     let urdf = fs::read_to_string(&urdf_path).map_err(|error| {

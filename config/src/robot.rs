@@ -11,7 +11,7 @@ pub struct RobotConfig {
     pub name: String,
     /// URDF beside this file.
     pub urdf: String,
-    /// Where `package://NAME/` leads, relative to this file.
+    /// Where `package://NAME/` leads: relative to this file where it is written, absolute once it is loaded.
     #[serde(default)]
     pub packages: BTreeMap<String, String>,
     /// Grasping hands, in order (right, left).

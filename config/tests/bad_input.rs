@@ -437,6 +437,20 @@ fn options_that_are_not_toml_are_strings() {
 }
 
 #[test]
+fn packages_of_a_loaded_robot_are_absolute_wherever_it_was_loaded_from() {
+    let root = fixture();
+    let (path, line) = (root.path().join(ROBOT), "foot_spacing_m = 0.2\n");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace(line, &format!("{line}packages = {{ team = \"../teams\" }}\n"))).unwrap();
+
+    let upwards = "../".repeat(std::env::current_dir().unwrap().components().count() - 1);
+    let relative = Path::new(&upwards).join(path.strip_prefix("/").unwrap().parent().unwrap());
+    let package = PathBuf::from(&load_robot(&relative, "arm").unwrap().config.packages["team"]);
+    assert!(package.is_absolute(), "{}", package.display());
+    assert!(package.join("pair.toml").is_file(), "{}", package.display());
+}
+
+#[test]
 fn robots_are_checked_as_scenarios_are() {
     for (good, bad, expected) in [
         (

@@ -1,26 +1,18 @@
 //! Why a world cannot be built, and why a step of it cannot be trusted.
 
-use mikoshi_humanoid::model::{FindElementError, LoadModelError};
+use mikoshi_robot::MatchRobotError;
 use thiserror::Error;
 
 /// A run that no physical world can be built from.
 #[derive(Debug, Error)]
 pub enum BuildWorldError {
-    /// A robot's description cannot be used.
+    /// A robot's description cannot be used, or its configuration names what it lacks.
     #[error("robot '{robot}': {source}")]
-    Model {
+    Robot {
         /// The robot.
         robot: String,
-        /// What is wrong with its URDF.
-        source: LoadModelError,
-    },
-    /// A robot's configuration names what its URDF lacks.
-    #[error("robot '{robot}': {source}")]
-    Element {
-        /// The robot.
-        robot: String,
-        /// What is missing.
-        source: FindElementError,
+        /// What does not fit.
+        source: MatchRobotError,
     },
     /// No drive is configured for a joint.
     #[error("robot '{robot}': no pattern of [[drives]] matches joint '{joint}'")]

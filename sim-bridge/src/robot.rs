@@ -3,8 +3,9 @@
 use crate::BuildWorldError;
 use mikoshi_config::RobotSpec;
 use mikoshi_config::robot::DriveConfig;
-use mikoshi_humanoid::model::{FindElementError, FrameId, Model, PackageTable};
-use mikoshi_ipc_types::{MAX_FEET, MAX_HANDS, MAX_JOINTS};
+use mikoshi_humanoid::estimate::ForceTorqueSensor;
+use mikoshi_humanoid::model::{FrameId, Model};
+use mikoshi_ipc_types::{MAX_HANDS, MAX_JOINTS};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// A palm or a sole, and the force/torque sensor that carries it.
@@ -31,31 +32,18 @@ pub struct Robot<'a> {
 impl<'a> Robot<'a> {
     pub fn resolve(spec: &'a RobotSpec) -> Result<Self, BuildWorldError> {
         let config = &spec.config;
-        let packages = config.packages.iter().map(|(name, path)| (name.clone(), path.into()));
-        let packages = PackageTable(packages.collect());
-        let model = Model::from_urdf(&spec.urdf, &|uri| packages.find(uri))
-            .map_err(|source| BuildWorldError::Model { robot: spec.member.name.clone(), source })?;
-        let element =
-            |source: FindElementError| BuildWorldError::Element { robot: spec.member.name.clone(), source };
         let inconsistent = |what: String| BuildWorldError::Inconsistent {
             place: format!("robot '{}'", spec.member.name),
             what,
         };
-
-        let extremity = |frame: &str, sensor: &str| -> Result<Extremity, FindElementError> {
-            Ok(Extremity { frame: model.find_frame(frame)?, sensor: model.find_frame(sensor)? })
-        };
-        let mut hands = vec![];
-        for &index in &spec.grasping_hands {
-            let hand = config
-                .hands
-                .get(index)
-                .ok_or_else(|| inconsistent(format!("grasps with hand {index} of {}", config.hands.len())))?;
-            hands.push(extremity(&hand.palm_link, &hand.sensor_link).map_err(element)?);
-        }
-        let feet = config.feet.iter().map(|foot| extremity(&foot.sole_link, &foot.sensor_link));
-        let feet = feet.collect::<Result<Vec<_>, _>>().map_err(element)?;
-        let imu = model.find_frame(&config.imu_link).map_err(element)?;
+        let body = mikoshi_robot::Robot::new(config, &spec.urdf)
+            .and_then(|robot| robot.with_hands(&spec.grasping_hands))
+            .map_err(|source| BuildWorldError::Robot { robot: spec.member.name.clone(), source })?;
+        let mikoshi_robot::Robot { model, palms, wrist_sensors, soles, ankle_sensors, imu, .. } = body;
+        let extremity =
+            |(frame, sensor): (FrameId, ForceTorqueSensor)| Extremity { frame, sensor: sensor.frame };
+        let hands: Vec<_> = palms.into_iter().zip(wrist_sensors).map(extremity).collect();
+        let feet = soles.into_array().into_iter().zip(ankle_sensors.into_array()).map(extremity).collect();
         let drive = |joint: &str| config.drives.iter().find(|drive| matches(&drive.joints, joint));
         let drives = model.joints().iter().map(|joint| {
             drive(&joint.name).ok_or_else(|| BuildWorldError::NoDrive {
@@ -74,11 +62,7 @@ impl<'a> Robot<'a> {
         {
             return Err(inconsistent(format!("{found} {name}, expected {expected}")));
         }
-        let limits = [
-            ("joints", model.joint_count(), MAX_JOINTS),
-            ("hands", hands.len(), MAX_HANDS),
-            ("feet", feet.len(), MAX_FEET),
-        ];
+        let limits = [("joints", model.joint_count(), MAX_JOINTS), ("hands", hands.len(), MAX_HANDS)];
         if let Some((name, found, limit)) = limits.into_iter().find(|(_, found, limit)| found > limit) {
             return Err(inconsistent(format!("{found} {name}, expected at most {limit}")));
         }

@@ -53,7 +53,7 @@ fn counts_that_do_not_match_are_refused() {
     assert_says(&bad, &["1 hand poses", "2"]);
     let mut bad = run();
     bad.robots[0].grasping_hands[1] = 7;
-    assert_says(&bad, &["hand 7"]);
+    assert_says(&bad, &["hands: found 2 hands, expected a hand 7"]);
     let mut bad = run();
     bad.robots[0].initial_base_pose[3] = f64::NAN;
     assert_says(&bad, &["not a pose"]);

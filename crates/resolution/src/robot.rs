@@ -2,14 +2,14 @@
 
 use crate::error::ResolveRunError;
 use crate::surface::distance_to_box;
+use core::fmt::Display;
 use mikoshi_config::robot::HandConfig;
 use mikoshi_config::scenario::{Member, Object as ObjectConfig};
 use mikoshi_config::{LoadedRobot, LoadedScenario, RobotSpec};
-use mikoshi_humanoid::Model;
 use mikoshi_humanoid::balance::{PerFoot, Side};
-use mikoshi_humanoid::ik::{IkConfig, IkGains, IkScratch, IkTargets, SettlePostureError, WholeBodyIk};
-use mikoshi_humanoid::model::{FindElementError, FrameId, PackageTable};
+use mikoshi_humanoid::ik::{IkScratch, IkTargets, SettlePostureError};
 use mikoshi_ipc_types::MAX_HANDS;
+use mikoshi_robot::Robot;
 use mikoshi_spatial::{Base, CoordinateFrame, Foot, Hand, Object, Pose, World};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -25,79 +25,21 @@ impl CoordinateFrame for Ground {}
 /// Every model of the team, read once.
 pub(crate) struct Models<'a>(BTreeMap<&'a str, UsableModel<'a>>);
 
-/// A model whose configuration fits its URDF.
+/// A model whose configuration fits its URDF, with all its hands.
 struct UsableModel<'a> {
     loaded: &'a LoadedRobot,
-    model: Model,
-    /// In the order of the model's joints.
-    carry_posture_rad: Vec<f64>,
-    palms: Vec<FrameId>,
-    soles: PerFoot<FrameId>,
-    waist: FrameId,
+    robot: Robot,
 }
 
 impl<'a> Models<'a> {
     pub(crate) fn load(scenario: &'a LoadedScenario) -> Result<Self, ResolveRunError> {
         let usable = |(name, loaded): (&'a String, &'a LoadedRobot)| {
-            UsableModel::load(loaded).map(|model| (name.as_str(), model))
+            let robot = Robot::new(&loaded.config, &loaded.urdf)
+                .map_err(|error| loaded.error_at(&error.key, error.problem))?;
+            Ok((name.as_str(), UsableModel { loaded, robot }))
         };
         scenario.models.iter().map(usable).collect::<Result<_, _>>().map(Self)
     }
-}
-
-impl<'a> UsableModel<'a> {
-    fn load(loaded: &'a LoadedRobot) -> Result<Self, ResolveRunError> {
-        let config = &loaded.config;
-        let folder = loaded.urdf_path.parent().unwrap_or(std::path::Path::new(""));
-        let packages = PackageTable(
-            config.packages.iter().map(|(name, path)| (name.clone(), folder.join(path))).collect(),
-        );
-        let model = Model::from_urdf(&loaded.urdf, &|mesh| packages.find(mesh))
-            .map_err(|error| loaded.error_at("urdf", format!("{}: {error}", loaded.urdf_path.display())))?;
-        let at = |key: String| move |error: FindElementError| loaded.error_at(&key, lacks(loaded, &error));
-        let link = |key: String, name: &str| model.find_frame(name).map_err(at(key));
-
-        let mut palms = vec![];
-        for (index, hand) in config.hands.iter().enumerate() {
-            palms.push(link(format!("hands.{index}.palm_link"), &hand.palm_link)?);
-            link(format!("hands.{index}.sensor_link"), &hand.sensor_link)?;
-        }
-        let mut soles = vec![];
-        for (index, foot) in config.feet.iter().enumerate() {
-            soles.push(link(format!("feet.{index}.sole_link"), &foot.sole_link)?);
-            link(format!("feet.{index}.sensor_link"), &foot.sensor_link)?;
-        }
-        let [right, left] = soles[..] else {
-            return Err(loaded.error_at("feet", format!("found {} feet, expected 2", soles.len())).into());
-        };
-        link("imu_link".to_owned(), &config.imu_link)?;
-        let waist = link("waist_link".to_owned(), &config.waist_link)?;
-
-        for name in config.carry_posture_deg.keys() {
-            model.find_joint(name).map_err(at(format!("carry_posture_deg.{name}")))?;
-        }
-        let carry_posture_rad = model
-            .joints()
-            .iter()
-            .map(|joint| {
-                let angle_deg = config.carry_posture_deg.get(&joint.name).copied().unwrap_or(0.0);
-                let angle_rad = angle_deg.to_radians();
-                if (joint.lower..=joint.upper).contains(&angle_rad) {
-                    return Ok(angle_rad);
-                }
-                let (lower, upper) = (joint.lower.to_degrees(), joint.upper.to_degrees());
-                let problem =
-                    format!("found {angle_deg}, expected {lower:.1} to {upper:.1}, the joint's limits");
-                Err(loaded.error_at(&format!("carry_posture_deg.{}", joint.name), problem))
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Self { loaded, carry_posture_rad, palms, soles: PerFoot { right, left }, waist, model })
-    }
-}
-
-fn lacks(loaded: &LoadedRobot, error: &FindElementError) -> String {
-    let FindElementError { element, name, known, .. } = error;
-    format!("found {name:?}, expected a {element} of {}: {known}", loaded.urdf_path.display())
 }
 
 /// Where this robot's grasping hands are, and a posture at rest that has them there.
@@ -146,7 +88,7 @@ pub(crate) fn resolve_robot(
         member: member.clone(),
         config: config.clone(),
         urdf: usable.loaded.urdf.clone(),
-        initial_base_pose: base_pose(usable, &settled, &targets).to_array(),
+        initial_base_pose: base_pose(&usable.robot, &settled, &targets).to_array(),
         initial_posture_rad: settled,
         grasping_hands,
         hand_in_object,
@@ -209,21 +151,15 @@ fn settle(
     grasping_hands: &[usize],
     targets: &IkTargets,
 ) -> Result<Vec<f64>, ResolveRunError> {
-    let config = IkConfig {
-        hands: grasping_hands.iter().map(|&hand| usable.palms[hand]).collect(),
-        feet: usable.soles,
-        waist: usable.waist,
-        posture: usable.carry_posture_rad.clone(),
-        period_s: scenario.scenario.control_period_s,
-        gains: IkGains::default(),
-    };
-    let ik = WholeBodyIk::new(&usable.model, config).map_err(|error| {
+    let unusable = |error: &dyn Display| {
         let problem = format!("found {:?}, expected a model that can be moved: {error}", member.model);
         scenario.error_at(&format!("robots.{index}.model"), problem)
-    })?;
-    let mut scratch = IkScratch::new(&usable.model);
-    let guess = &usable.carry_posture_rad;
-    let settled = ik.settle(&usable.model, &mut scratch, guess, targets).map_err(|source| {
+    };
+    let robot = usable.robot.clone().with_hands(grasping_hands).map_err(|error| unusable(&error))?;
+    let ik = robot.whole_body_ik(scenario.scenario.control_period_s).map_err(|error| unusable(&error))?;
+    let mut scratch = IkScratch::new(&robot.model);
+    let guess = &robot.carry_posture_rad;
+    let settled = ik.settle(&robot.model, &mut scratch, guess, targets).map_err(|source| {
         let robot = member.name.clone();
         match source {
             SettlePostureError::UnreachableGrasp { hand, .. } => {
@@ -234,12 +170,12 @@ fn settle(
             _ => ResolveRunError::NoStance { robot, source },
         }
     })?;
-    Ok(settled.joint_position[..usable.model.joint_count()].to_vec())
+    Ok(settled.joint_position[..robot.model.joint_count()].to_vec())
 }
 
 /// The root link in the world, by the stance foot.
-fn base_pose(usable: &UsableModel<'_>, posture_rad: &[f64], targets: &IkTargets) -> Pose<World, Base> {
+fn base_pose(robot: &Robot, posture_rad: &[f64], targets: &IkTargets) -> Pose<World, Base> {
     let X_WF = targets.feet[targets.stance];
-    let X_BF: Pose<Base, Foot> = usable.model.pose_in_base(usable.soles[targets.stance], posture_rad);
+    let X_BF: Pose<Base, Foot> = robot.model.pose_in_base(robot.soles[targets.stance], posture_rad);
     X_WF * X_BF.inverse()
 }

@@ -108,6 +108,13 @@ fn names_that_the_urdf_lacks_are_found_in_the_file_that_uses_them() {
     });
     assert!(error.contains("carry_posture_deg.RLEG_JOINT9: found"), "{error}");
     let error = lacks(|config| {
+        config.carry_posture_deg.remove("HEAD_JOINT1");
+    });
+    assert!(
+        error.contains("hrp2.toml:") && error.contains("carry_posture_deg.HEAD_JOINT1: found nothing"),
+        "{error}"
+    );
+    let error = lacks(|config| {
         config.carry_posture_deg.insert("RLEG_JOINT3".into(), -90.0);
     });
     assert!(error.contains("RLEG_JOINT3: found -90, expected") && error.contains("limits"), "{error}");

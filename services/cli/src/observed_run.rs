@@ -3,9 +3,8 @@
 use crate::failure::Failure;
 use crate::prepare::Prepared;
 use mikoshi_config::RobotSpec;
-use mikoshi_humanoid::Model;
 use mikoshi_observation::{ObservedJoint, ObservedRobot, ObservedRun};
-use std::path::PathBuf;
+use mikoshi_robot::Robot;
 
 /// What observers must know of this run.
 ///
@@ -25,9 +24,9 @@ pub fn observed_run(prepared: &Prepared) -> Result<ObservedRun, Failure> {
 }
 
 fn observed_robot(robot: &RobotSpec) -> Result<ObservedRobot, Failure> {
-    // Nobody looks at its meshes here.
-    let model = Model::from_urdf(&robot.urdf, &|mesh| Some(PathBuf::from(mesh)))
-        .map_err(|error| Failure::fault(error).context(&robot.member.name))?;
+    let model = Robot::new(&robot.config, &robot.urdf)
+        .map_err(|error| Failure::fault(error).context(&robot.member.name))?
+        .model;
     let joints = model.joints().iter().map(|joint| ObservedJoint {
         name: joint.name.clone(),
         lower_rad: joint.lower,

@@ -70,10 +70,7 @@ impl Servo {
     /// The robot's description can't be used.
     pub fn new(run: &RunSpec, index: usize) -> Result<Self, BuildRobotError> {
         let spec = &run.robots[index];
-        let period_s = run.scenario.control_period_s;
-        let robot = Robot::new(&spec.config, &spec.urdf, &spec.grasping_hands, period_s, &|mesh| {
-            Some(std::path::PathBuf::from(mesh))
-        })?;
+        let robot = Robot::new(spec, run.scenario.control_period_s)?;
         let mut kinematics = robot.kinematics();
         let X_WB = Pose::from_array(&spec.initial_base_pose).unwrap_or_else(Pose::identity);
         kinematics.update(&robot.model, &X_WB, &spec.initial_posture_rad);
