@@ -6,7 +6,7 @@
 
 use crate::process::ProcessIdentity;
 use crate::wait::Bed;
-use crate::{FaultCode, TickError};
+use crate::{FaultCode, Position, TickError};
 use core::fmt;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use memmap2::MmapRaw;
@@ -163,8 +163,12 @@ pub(crate) struct Slot {
 
 #[repr(C, align(64))]
 struct Progress {
-    tick: AtomicU64,
+    /// A [`Position`]: the tick, and the phase in the lowest bits.
+    position: AtomicU64,
 }
+
+/// More phases in a tick than any service has.
+const PHASE_BITS: u32 = 4;
 
 impl Slot {
     pub(crate) fn role(&self) -> Option<Role> {
@@ -179,12 +183,14 @@ impl Slot {
         self.state.store(state as u32, Ordering::Release);
     }
 
-    pub(crate) fn tick(&self) -> u64 {
-        self.progress.tick.load(Ordering::Acquire)
+    pub(crate) fn position(&self) -> Position {
+        let word = self.progress.position.load(Ordering::Acquire);
+        Position { tick: word >> PHASE_BITS, phase: (word & ((1 << PHASE_BITS) - 1)) as usize }
     }
 
-    pub(crate) fn set_tick(&self, tick: u64) {
-        self.progress.tick.store(tick, Ordering::Release);
+    pub(crate) fn set_position(&self, position: Position) {
+        let word = position.tick << PHASE_BITS | position.phase as u64;
+        self.progress.position.store(word, Ordering::Release);
     }
 
     pub(crate) fn process(&self) -> Option<ProcessIdentity> {
@@ -237,7 +243,7 @@ impl Slot {
             alive: process.is_some_and(|process| process.is_alive()),
             epoch: self.epoch.load(Ordering::Acquire),
             state: self.state(),
-            tick: self.tick(),
+            tick: self.position().tick,
             fault: self.fault(),
         })
     }
@@ -253,7 +259,7 @@ struct Header {
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi1");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi2");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -347,6 +353,15 @@ impl Board {
         self.slots().iter().filter_map(|slot| Some((slot.role()?, slot.state())))
     }
 
+    /// Where all services are.
+    pub fn positions(&self) -> impl Iterator<Item = (ServiceId, Position)> {
+        self.slots().iter().filter_map(|slot| match slot.role()? {
+            Role::Service(service) if slot.state().has_ended() => Some((service, Position::END)),
+            Role::Service(service) => Some((service, slot.position())),
+            _ => None,
+        })
+    }
+
     /// What all slots say, in order.
     pub fn statuses(&self) -> Vec<SlotStatus> {
         self.slots().iter().filter_map(Slot::status).collect()
@@ -433,7 +448,7 @@ mod tests {
         let index = ours.index_of(Role::Service(ServiceId::Servo(1))).expect("a slot");
         let slot = &ours.slots()[index];
         slot.claim(own()).expect("it is free");
-        slot.set_tick(7);
+        slot.set_position(Position { tick: 7, phase: 1 });
         slot.set_fault(&TickError::PeerLost(ServiceId::Bridge));
         slot.set_state(State::Failed);
         let status = &theirs.statuses()[index];
@@ -441,6 +456,11 @@ mod tests {
         assert_eq!((status.process, status.alive), (Some(own()), true));
         assert_eq!((status.epoch, status.state, status.tick), (1, State::Failed, 7));
         assert_eq!(status.fault, Some((FaultCode::PeerLost, "bridge is gone".into())));
+        let position_of = |index: usize| theirs.positions().nth(index).expect("a service");
+        assert_eq!(position_of(2), (ServiceId::Servo(1), Position::END));
+        slot.set_state(State::Running);
+        assert_eq!(position_of(2), (ServiceId::Servo(1), Position { tick: 7, phase: 1 }));
+        assert_eq!(position_of(0), (ServiceId::Bridge, Position::default()));
     }
 
     #[test]

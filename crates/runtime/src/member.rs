@@ -3,7 +3,7 @@
 use crate::board::{Board, BoardError, Role, Slot, State};
 use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::wait::{Reason, WaitPolicy, Woken};
-use crate::{FaultCode, TickError};
+use crate::{FaultCode, Position, TickError};
 use core::cell::RefCell;
 use mikoshi_ipc_types::ServiceId;
 use std::io;
@@ -106,8 +106,13 @@ impl Member {
         self.board.wake_all();
     }
 
-    pub(crate) fn begin_tick(&self, tick: u64) -> Result<(), TickError> {
-        self.slot().set_tick(tick);
+    /// Enters a phase. At the start of a tick it looks whether the run goes on.
+    pub(crate) fn begin_phase(&self, at: Position) -> Result<(), TickError> {
+        self.slot().set_position(at);
+        let Position { tick, phase } = at;
+        if phase > 0 {
+            return Ok(());
+        }
         if self.board.alarm_is_raised() || tick % LOOK_AROUND_TICKS == LOOK_AROUND_TICKS - 1 {
             return self.look_around();
         }
@@ -134,7 +139,7 @@ impl Member {
         let Some(tap) = self.slot_of(Role::Tap) else { return Ok(()) };
         self.wait_for(Reason::CREDIT, || {
             let attached = (State::Starting..=State::Running).contains(&tap.state());
-            Ok((!attached || tap.tick() >= ticks).then_some(()))
+            Ok((!attached || tap.position().tick >= ticks).then_some(()))
         })
     }
 

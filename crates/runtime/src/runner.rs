@@ -1,6 +1,6 @@
 //! Runners: they execute a schedule, and know nothing of what is executed.
 
-use crate::{Call, TickError, TickSchedule};
+use crate::{Call, Position, TickError, TickSchedule};
 use core::ops::ControlFlow;
 use mikoshi_ipc_types::ServiceId;
 
@@ -44,11 +44,11 @@ pub trait Session {
     /// A process is lost, the run is to stop, or shared memory is full.
     fn start(&self) -> Result<(), TickError>;
 
-    /// Enters a tick.
+    /// Enters a phase; with the first one, a tick.
     ///
     /// # Errors
     /// A process is lost, or the run is to stop.
-    fn begin_tick(&self, tick: u64) -> Result<(), TickError>;
+    fn begin_phase(&self, at: Position) -> Result<(), TickError>;
 
     /// Meets all others after the last tick, or tells them why there will be no more.
     ///
@@ -122,8 +122,8 @@ pub fn run_service<P: Participant>(
     let mut run = || {
         session.start()?;
         while tick < ticks {
-            session.begin_tick(tick)?;
-            for &call in &calls {
+            for (phase, &call) in calls.iter().enumerate() {
+                session.begin_phase(Position { tick, phase })?;
                 participant.execute(call, tick)?;
             }
             tick += 1;

@@ -113,6 +113,20 @@ impl Placement {
     }
 }
 
+/// Where a service is: the phase that it executes, or waits to execute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Position {
+    /// The tick.
+    pub tick: u64,
+    /// How many of the service's phases of this tick are behind it.
+    pub phase: usize,
+}
+
+impl Position {
+    /// Behind the last tick of any run.
+    pub const END: Self = Self { tick: u64::MAX, phase: 0 };
+}
+
 /// Why a list of phases is not a schedule.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs)]
@@ -287,6 +301,24 @@ impl TickSchedule {
         })
     }
 
+    /// The services that wait for nobody: what their phase needs has been published. When nothing moves
+    /// any more, it is they who keep all others waiting.
+    pub fn unhindered(&self, position_of: impl Fn(ServiceId) -> Position) -> Vec<ServiceId> {
+        let is_published = |input: &Input, tick: u64| {
+            let publishes = |phase: &Phase| phase.outputs.iter().any(|output| output.topic == input.topic);
+            let phase = self.phases_of(input.from).position(publishes).unwrap_or_default();
+            position_of(input.from) > Position { tick, phase }
+        };
+        let waits_for_nobody = |service: &ServiceId| {
+            let Position { tick, phase } = position_of(*service);
+            let phase = self.phases_of(*service).nth(phase);
+            let inputs = phase.map(|phase| phase.inputs.as_slice()).unwrap_or_default();
+            inputs.iter().all(|input| input.tick_at(tick).is_none_or(|tick| is_published(input, tick)))
+        };
+        let has_not_ended = |service: &ServiceId| position_of(*service) != Position::END;
+        self.services().into_iter().filter(has_not_ended).filter(waits_for_nobody).collect()
+    }
+
     /// The input of a service by this topic.
     pub fn input_of(&self, service: ServiceId, topic: Topic) -> Option<&Input> {
         self.consumers_of(topic).find(|(consumer, _)| *consumer == service).map(|(_, input)| input)
@@ -424,6 +456,54 @@ mod tests {
         assert_eq!(of_team(0, 0), Err(ScheduleError::TeamSize(0)));
         assert_eq!(of_team(MAX_ROBOTS + 1, 0), Err(ScheduleError::TeamSize(MAX_ROBOTS + 1)));
         assert_eq!(of_team(4, MAX_AGE_TICKS + 1), Err(ScheduleError::Age(MAX_AGE_TICKS + 1)));
+    }
+
+    /// Where a team of two stops that stops one service at this position.
+    fn standstill(schedule: &TickSchedule, stopped: ServiceId, at: Position) -> Vec<ServiceId> {
+        let mut positions: Vec<_> =
+            schedule.services().into_iter().map(|service| (service, Position::default())).collect();
+        loop {
+            let before = positions.clone();
+            let position_of =
+                |id: ServiceId| before.iter().find(|(service, _)| *service == id).expect("it is there").1;
+            let free = schedule.unhindered(position_of);
+            for (service, position) in &mut positions {
+                if free.contains(service) && (*service != stopped || *position < at) {
+                    position.phase += 1;
+                    if position.phase == schedule.phases_of(*service).count() {
+                        *position = Position { tick: position.tick + 1, phase: 0 };
+                    }
+                }
+            }
+            if positions == before {
+                assert_eq!(position_of(stopped), at);
+                return free;
+            }
+        }
+    }
+
+    #[test]
+    fn whoever_stops_is_the_only_one_who_waits_for_nobody() {
+        for delay_ticks in [0, 1, 3] {
+            let schedule = team_of(2, delay_ticks);
+            for service in schedule.services() {
+                for phase in 0..schedule.phases_of(service).count() {
+                    for tick in [0, 5] {
+                        let found = standstill(&schedule, service, Position { tick, phase });
+                        assert_eq!(found, [service], "{service} at phase {phase} of tick {tick}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn who_has_ended_keeps_nobody_waiting() {
+        let schedule = team_of(2, 0);
+        assert_eq!(schedule.unhindered(|_| Position::END), []);
+        let in_last_step = Position { tick: 9, phase: 1 };
+        let position_of = |id| if id == ServiceId::Bridge { in_last_step } else { Position::END };
+        assert_eq!(schedule.unhindered(position_of), [ServiceId::Bridge]);
     }
 
     #[test]

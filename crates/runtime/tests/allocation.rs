@@ -6,9 +6,9 @@ use core::alloc::{GlobalAlloc, Layout};
 use core::cell::Cell;
 use mikoshi_ipc_types::{Frame, ObjectTruth, ServiceId};
 use mikoshi_runtime::{
-    Board, Call, IceoryxTap, IceoryxTransport, InMemoryHub, Member, Observer, Participant, Placement, Role,
-    RunDirectory, Session, Tap, TickError, TickSchedule, Transport, WaitPolicy, run_in_one_thread,
-    run_service,
+    Board, Call, IceoryxTap, IceoryxTransport, InMemoryHub, Member, Observer, Participant, Placement,
+    Position, Role, RunDirectory, Session, Tap, TickError, TickSchedule, Transport, WaitPolicy,
+    run_in_one_thread, run_service,
 };
 use std::ops::ControlFlow;
 use std::os::unix::fs::PermissionsExt;
@@ -142,8 +142,8 @@ impl Session for FrugalSession<'_> {
         self.0.start()
     }
 
-    fn begin_tick(&self, tick: u64) -> Result<(), TickError> {
-        with_allocations(0, || self.0.begin_tick(tick))
+    fn begin_phase(&self, at: Position) -> Result<(), TickError> {
+        with_allocations(0, || self.0.begin_phase(at))
     }
 
     fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {

@@ -96,6 +96,13 @@ impl Children {
         has_failed
     }
 
+    /// Kills these: they are frozen, and would not end by themselves.
+    pub fn kill_frozen(&mut self, services: &[ServiceId]) {
+        for process in self.processes.iter_mut().filter(|process| services.contains(&process.service)) {
+            process.kill();
+        }
+    }
+
     /// Waits until all have ended, and kills those that have not after a while.
     pub fn end(&mut self) {
         let since_asked = Stopwatch::start();
@@ -113,10 +120,8 @@ impl Children {
     }
 
     fn kill(&mut self) {
-        for process in self.processes.iter_mut().filter(|process| process.ended.is_none()) {
-            // It fails for a process that has just ended, which is what we want.
-            let _ = process.child.kill();
-            process.ended = process.child.wait().ok().map(|status| Ended { status, by_us: true });
+        for process in &mut self.processes {
+            process.kill();
         }
     }
 }
@@ -128,6 +133,14 @@ impl Drop for Children {
 }
 
 impl ServiceProcess {
+    fn kill(&mut self) {
+        if self.ended.is_none() {
+            // It fails for a process that has just ended, which is what we want.
+            let _ = self.child.kill();
+            self.ended = self.child.wait().ok().map(|status| Ended { status, by_us: true });
+        }
+    }
+
     /// The last lines that it wrote, indented; empty if it said nothing.
     pub fn last_words(&self) -> String {
         let text = fs::read(&self.log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());

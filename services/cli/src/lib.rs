@@ -22,6 +22,7 @@ pub mod prepare;
 pub mod print;
 mod progress;
 mod report;
+mod standstill;
 mod supervisor;
 mod table;
 mod wall_clock;

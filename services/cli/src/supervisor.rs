@@ -9,13 +9,15 @@ use crate::observer::RunObserver;
 use crate::outcome::{Outcome, fault_of, label_of, robot_name};
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
+use crate::standstill::Standstill;
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Fault, Observation, TeamTap};
 use mikoshi_resolution::write_run;
 use mikoshi_runtime::{
-    Board, Domain, FaultCode, IceoryxTap, Member, Role, RunDirectory, SlotStatus, State, TickError,
+    Board, Domain, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State, TickError,
     WaitPolicy, required_bytes,
 };
 use std::fs;
@@ -23,8 +25,11 @@ use std::path::Path;
 
 /// How often the supervisor looks around. The tap's queues hold many times what a run makes of it.
 const LOOK: Duration = Duration::from_millis(1);
-/// A run that makes no tick for so long is stuck: a process is frozen, or waits for what never comes.
-const STALL: Duration = Duration::from_secs(30);
+/// A run in which no service gets on for so long is stuck. A tick takes milliseconds, and its longest
+/// phase, the physics of sixteen robots, tens of them; a busy machine stalls for up to a second.
+const STALL: Duration = Duration::from_secs(3);
+/// The same while services set themselves up: worlds are built and memory is touched.
+const START_STALL: Duration = Duration::from_secs(30);
 
 /// Carries the run out.
 ///
@@ -58,10 +63,16 @@ enum Watched {
     Signal(u8),
     /// A process has ended, or said that it failed.
     Lost,
-    /// No tick came for [`STALL`].
-    Stalled,
+    /// These services keep all others waiting.
+    Stalled(Stall),
     /// The run can't be observed any more.
     Unobservable(Failure),
+}
+
+/// A run in which nothing moves any more.
+struct Stall {
+    lasted: Duration,
+    culprits: Vec<ServiceId>,
 }
 
 // In this order they are dropped: processes end before their place on the board does.
@@ -91,7 +102,7 @@ impl Supervisor {
     }
 
     fn watch(&mut self, prepared: &Prepared, observer: &mut RunObserver, interrupts: &Interrupts) -> Watched {
-        let mut since_progress = Stopwatch::start();
+        let (mut clock, mut standstill) = (Stopwatch::start(), Standstill::default());
         let mut observation = Observation::for_team(prepared.run.robots.len());
         let mut is_started = false;
         loop {
@@ -106,7 +117,6 @@ impl Supervisor {
                         return Watched::Unobservable(Failure::fault(error));
                     }
                     self.tap.set_consumed(observer.ticks());
-                    since_progress = Stopwatch::start();
                     if observer.ticks() == prepared.run.ticks {
                         return Watched::All;
                     }
@@ -126,8 +136,11 @@ impl Supervisor {
             if self.children.look() || self.any_service_is(State::Failed) {
                 return Watched::Lost;
             }
-            if since_progress.elapsed() > STALL {
-                return Watched::Stalled;
+            let is_set_up = self.all_services_are(State::Ready);
+            let lasted = standstill.look(self.progress(), clock.lap());
+            if lasted > if is_set_up { STALL } else { START_STALL } {
+                let culprits = if is_set_up { self.unhindered(prepared) } else { self.least_advanced() };
+                return Watched::Stalled(Stall { lasted, culprits });
             }
             pause(LOOK);
         }
@@ -140,12 +153,15 @@ impl Supervisor {
             self.member.board().request_stop();
         }
         self.tap.detach();
+        if let Watched::Stalled(stall) = &watched {
+            self.children.kill_frozen(&stall.culprits);
+        }
         self.children.end();
         let outcome = match watched {
             Watched::All if !self.children.look() => Outcome::Completed,
             Watched::All | Watched::Lost => self.diagnose(run),
             Watched::Signal(signal) => Outcome::Interrupted(signal),
-            Watched::Stalled => stalled(run, &before),
+            Watched::Stalled(stall) => stalled(run, &stall, &before),
             Watched::Unobservable(failure) => Outcome::Fault { failure, faults: vec![] },
         };
         self.member.conclude();
@@ -182,19 +198,40 @@ impl Supervisor {
     }
 
     fn all_services_are(&self, state: State) -> bool {
-        self.service_states().all(|found| found >= state)
+        self.service_states().all(|(_, found)| found >= state)
     }
 
     fn any_service_is(&self, state: State) -> bool {
-        self.service_states().any(|found| found == state)
+        self.service_states().any(|(_, found)| found == state)
     }
 
-    fn service_states(&self) -> impl Iterator<Item = State> {
-        let statuses = self.member.board().statuses();
-        statuses
-            .into_iter()
-            .filter(|status| matches!(status.role, Role::Service(_)))
-            .map(|status| status.state)
+    fn service_states(&self) -> impl Iterator<Item = (ServiceId, State)> {
+        self.member.board().states().filter_map(|(role, state)| match role {
+            Role::Service(service) => Some((service, state)),
+            _ => None,
+        })
+    }
+
+    /// A number that changes whenever a service gets on.
+    fn progress(&self) -> u64 {
+        let states = self.service_states().map(|(_, state)| state as u64);
+        let positions = self.member.board().positions();
+        // Each of its terms only ever grows, except in the end, when all of them do at once.
+        let terms = positions.map(|(_, at)| at.tick.wrapping_mul(1 << 8).wrapping_add(at.phase as u64));
+        states.chain(terms).fold(0, u64::wrapping_add)
+    }
+
+    fn unhindered(&self, prepared: &Prepared) -> Vec<ServiceId> {
+        let positions: Vec<_> = self.member.board().positions().collect();
+        let position_of = |service| {
+            positions.iter().find(|(other, _)| *other == service).map_or(Position::END, |(_, at)| *at)
+        };
+        prepared.schedule.unhindered(position_of)
+    }
+
+    fn least_advanced(&self) -> Vec<ServiceId> {
+        let least = self.service_states().map(|(_, state)| state).min();
+        self.service_states().filter(|(_, state)| Some(*state) == least).map(|(service, _)| service).collect()
     }
 }
 
@@ -232,15 +269,30 @@ fn describe(process: &ServiceProcess, status: Option<&SlotStatus>) -> Failure {
     Failure { status: exit_status, message }
 }
 
-fn stalled(run: &RunSpec, board: &[SlotStatus]) -> Outcome {
-    let mut message = format!("no tick for {} s: a process is frozen, or too slow", STALL.as_secs());
-    for status in board {
-        if let Role::Service(service) = status.role {
-            let name = label_of(run, service);
-            message += &format!("\n  {name}: {} in tick {}", status.state, status.tick);
+/// `board` is what it said before anybody was asked to stop.
+fn stalled(run: &RunSpec, stall: &Stall, board: &[SlotStatus]) -> Outcome {
+    let is_culprit = |status: &&SlotStatus| match status.role {
+        Role::Service(service) => stall.culprits.contains(&service),
+        _ => false,
+    };
+    let told = |status: &SlotStatus| {
+        let Role::Service(service) = status.role else { return String::new() };
+        match status.state {
+            State::Running => format!("{} in tick {}", label_of(run, service), status.tick),
+            state => format!("{}, {state}", label_of(run, service)),
         }
-    }
-    Outcome::Fault { failure: Failure { status: Status::Fault, message }, faults: vec![] }
+    };
+    let culprits: Vec<_> = board.iter().filter(is_culprit).map(told).collect();
+    let message = format!(
+        "nothing moved for {:.1} s; all wait for {}: frozen, or too slow",
+        stall.lasted.as_secs_f64(),
+        culprits.join(" and ")
+    );
+    let faults = board.iter().filter(is_culprit).filter_map(|status| match status.role {
+        Role::Service(service) => Some(fault_of(run, service, status.tick, "stalled".to_owned())),
+        _ => None,
+    });
+    Outcome::Fault { failure: Failure { status: Status::Fault, message }, faults: faults.collect() }
 }
 
 fn fault_in(run: &RunSpec, status: &SlotStatus) -> Option<Fault> {

@@ -17,6 +17,13 @@ impl Stopwatch {
         Self { start: Instant::now() }
     }
 
+    /// What it shows; it starts again from zero.
+    pub fn lap(&mut self) -> Duration {
+        let elapsed = self.elapsed();
+        *self = Self::start();
+        elapsed
+    }
+
     /// What it shows.
     pub fn elapsed(&self) -> Duration {
         self.start.elapsed()

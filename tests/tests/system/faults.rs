@@ -45,6 +45,51 @@ fn a_servo_that_is_killed_ends_the_run() {
     kill_one(ServiceId::Servo(2), "servo of robot C", "servo");
 }
 
+fn freeze_one(service: ServiceId, name: &str, kind: &str) {
+    let results = Results::new();
+    let running = start(&results);
+    let (directory, services) = (running.directory(), running.services());
+    running.signal_service(service, Signal::STOP);
+    let said = running.wait();
+    said.expect_error(3, &["nothing moved for 3.0 s", &format!("all wait for {name} in tick "), "frozen"]);
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+    assert_eq!(services.iter().filter(|(_, pid)| is_alive(*pid)).count(), 0);
+
+    let summary = results.summary();
+    assert_eq!(summary["faults"].as_array().map(Vec::len), Some(1), "{summary:#}");
+    let cause = &summary["faults"][0];
+    assert_eq!((&cause["service"], &cause["code"]), (&kind.into(), &"stalled".into()), "{summary:#}");
+}
+
+#[test]
+fn a_bridge_that_is_frozen_ends_the_run() {
+    freeze_one(ServiceId::Bridge, "bridge", "bridge");
+}
+
+#[test]
+fn a_coordinator_that_is_frozen_ends_the_run() {
+    freeze_one(ServiceId::Coordinator, "coordinator", "coordinator");
+}
+
+#[test]
+fn a_servo_that_is_frozen_ends_the_run() {
+    freeze_one(ServiceId::Servo(2), "servo of robot C", "servo");
+}
+
+#[test]
+fn a_service_that_freezes_again_and_again_for_a_moment_only_slows_the_run() {
+    let results = Results::new();
+    let running = start(&results);
+    for _ in 0..100 {
+        running.signal_service(ServiceId::Servo(1), Signal::STOP);
+        yield_now();
+        running.signal_service(ServiceId::Servo(1), Signal::CONT);
+    }
+    running.signal(Signal::TERM);
+    assert_eq!(running.wait().status, Some(143));
+    assert_eq!(results.summary()["faults"].as_array().map(Vec::len), Some(0));
+}
+
 #[test]
 fn a_frozen_service_does_not_keep_the_run_from_ending() {
     let results = Results::new();

@@ -11,7 +11,7 @@ use crate::board::{Role, State};
 use crate::member::{Member, TAP_LEAD_TICKS};
 use crate::shared_memory::populate;
 use crate::wait::Reason;
-use crate::{Domain, DomainError, Session, TickError, TickSchedule, Topic};
+use crate::{Domain, DomainError, Position, Session, TickError, TickSchedule, Topic};
 use core::cell::{Cell, RefCell};
 use core::mem::MaybeUninit;
 use core::sync::atomic::Ordering;
@@ -170,16 +170,13 @@ impl Process {
         }
     }
 
-    /// Meets all others, connects all ports, and touches all memory.
-    fn start(&self) -> Result<(), TickError> {
+    /// Meets all others once they have their ports, connects to them, and touches all memory.
+    fn prepare(&self) -> Result<(), TickError> {
         self.member.meet(State::Wired)?;
         self.member.watch_all();
         self.connect();
         let files = self.domain.shared_memory_files().unwrap_or_default();
-        populate(&files).map_err(|_| TickError::SharedMemoryFull)?;
-        self.member.meet(State::Ready)?;
-        self.member.enter(State::Running);
-        Ok(())
+        populate(&files).map_err(|_| TickError::SharedMemoryFull)
     }
 }
 
@@ -216,13 +213,16 @@ impl IceoryxTransport {
 
 impl Session for IceoryxTransport {
     fn start(&self) -> Result<(), TickError> {
-        self.process.start()
+        self.process.prepare()?;
+        self.process.member.meet(State::Ready)?;
+        self.process.member.enter(State::Running);
+        Ok(())
     }
 
-    fn begin_tick(&self, tick: u64) -> Result<(), TickError> {
-        self.process.member.begin_tick(tick)?;
-        if self.opens_tick {
-            self.process.member.wait_for_tap((tick + 1).saturating_sub(TAP_LEAD_TICKS))?;
+    fn begin_phase(&self, at: Position) -> Result<(), TickError> {
+        self.process.member.begin_phase(at)?;
+        if self.opens_tick && at.phase == 0 {
+            self.process.member.wait_for_tap((at.tick + 1).saturating_sub(TAP_LEAD_TICKS))?;
         }
         Ok(())
     }
@@ -412,12 +412,16 @@ impl IceoryxTap {
         Ok(Self { process, opener, consumed: Rc::default() })
     }
 
-    /// Meets all services before the first tick, once all observers have been made.
+    /// Meets all services before the first tick, once all observers have been made. It does not block
+    /// once all of them are [`State::Wired`].
     ///
     /// # Errors
     /// A process is lost, the run is to stop, or shared memory is full.
     pub fn start(&self) -> Result<(), TickError> {
-        self.process.start()
+        self.process.prepare()?;
+        // No tick begins before the tap is ready, and it can begin whenever the services do.
+        self.process.member.enter(State::Running);
+        Ok(())
     }
 
     /// Says that every frame of this many ticks has been consumed: the run stays within
@@ -425,7 +429,7 @@ impl IceoryxTap {
     pub fn set_consumed(&self, ticks: u64) {
         self.consumed.set(ticks);
         let member = &self.process.member;
-        member.slot().set_tick(ticks);
+        member.slot().set_position(Position { tick: ticks, phase: 0 });
         if let Some(slot) = self.opener.and_then(|index| member.board().slots().get(index)) {
             slot.bed.wake(Reason::CREDIT);
         }
