@@ -1,7 +1,8 @@
 //! The identity of a run: every payload of every service, in one canonical order.
 
 use mikoshi_ipc_types::{
-    Frame, JointCommand, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, TeamCommand, TeamState,
+    Envelope, Field, Frame, JointCommand, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, TeamCommand,
+    TeamState,
 };
 
 /// All frames of one tick.
@@ -30,6 +31,54 @@ pub struct PayloadRef<'a> {
     pub bytes: &'a [u8],
 }
 
+impl PayloadRef<'_> {
+    /// The payload, if it is a `P`.
+    pub fn read<P: Payload>(&self) -> Option<P> {
+        (self.name == P::NAME).then(|| bytemuck::try_pod_read_unaligned(self.bytes).ok()).flatten()
+    }
+
+    /// The field that holds the byte at `offset_bytes`.
+    pub fn field_at(&self, offset_bytes: usize) -> Option<&'static Field> {
+        let kind = Kind::ALL.iter().find(|kind| kind.name == self.name)?;
+        let mut fields = kind.fields.iter();
+        fields
+            .find(|field| (field.offset_bytes..field.offset_bytes + field.size_bytes).contains(&offset_bytes))
+    }
+}
+
+/// A payload type as data.
+pub(crate) struct Kind {
+    pub name: &'static str,
+    pub type_name: &'static str,
+    pub fields: &'static [Field],
+    pub size_bytes: usize,
+    /// One for each robot, or one for the team.
+    pub is_per_robot: bool,
+}
+
+impl Kind {
+    /// Every payload, in the order in which a tick produces them.
+    pub const ALL: &[Self] = &[
+        Self::of::<Sensors>(true),
+        Self::of::<ObjectTruth>(false),
+        Self::of::<RobotTruth>(true),
+        Self::of::<RobotState>(true),
+        Self::of::<TeamCommand>(true),
+        Self::of::<TeamState>(false),
+        Self::of::<JointCommand>(true),
+    ];
+
+    const fn of<P: Payload>(is_per_robot: bool) -> Self {
+        let (name, type_name, fields) = (P::NAME, P::TYPE_NAME, P::FIELDS);
+        Self { name, type_name, fields, size_bytes: size_of::<P>(), is_per_robot }
+    }
+
+    /// How many of them a tick of a team has.
+    pub fn count(&self, robots: usize) -> usize {
+        if self.is_per_robot { robots } else { 1 }
+    }
+}
+
 impl Observation {
     /// Zeroed frames for a team.
     pub fn for_team(robots: usize) -> Self {
@@ -47,6 +96,32 @@ impl Observation {
     /// The tick that all frames belong to.
     pub fn tick(&self) -> u64 {
         self.object_truth.envelope.tick
+    }
+
+    /// Puts a payload in its place; `false` if it has none here.
+    pub fn take(&mut self, payload: &PayloadRef<'_>) -> bool {
+        fn put<P: Payload>(frames: &mut [Frame<P>], payload: &PayloadRef<'_>) -> Option<()> {
+            let frame = frames.get_mut(payload.robot)?;
+            frame.payload = payload.read()?;
+            frame.envelope = Envelope {
+                schema_hash: P::SCHEMA_HASH,
+                tick: payload.tick,
+                robot: payload.robot as u64,
+                ..Envelope::default()
+            };
+            Some(())
+        }
+        let taken = match payload.name {
+            Sensors::NAME => put(&mut self.sensors, payload),
+            ObjectTruth::NAME => put(core::slice::from_mut(&mut self.object_truth), payload),
+            RobotTruth::NAME => put(&mut self.robot_truth, payload),
+            RobotState::NAME => put(&mut self.robot_state, payload),
+            TeamCommand::NAME => put(&mut self.team_command, payload),
+            TeamState::NAME => put(core::slice::from_mut(&mut self.team_state), payload),
+            JointCommand::NAME => put(&mut self.joint_command, payload),
+            _ => None,
+        };
+        taken.is_some()
     }
 
     /// Every payload, in the order in which a tick produces them.

@@ -7,6 +7,7 @@
 mod canonical;
 mod figures;
 mod log;
+mod reader;
 mod summary;
 mod tap;
 mod truth;
@@ -14,6 +15,7 @@ mod truth;
 pub use canonical::{LogHash, Observation, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use log::{LogWriter, WriteLogError};
+pub use reader::{LogReader, ReadLogError};
 pub use summary::{Fault, InternalSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
 pub use tap::TeamTap;
 pub use truth::{ObjectTracker, TrackedObject, is_loaded};

@@ -4,22 +4,22 @@
 //! endian; the channel's schema lists the fields with type, offset and size, so that a reader needs
 //! nothing but the file.
 
-use crate::canonical::{Observation, PayloadRef};
+use crate::canonical::{Kind, Observation, PayloadRef};
 use core::fmt::Write as _;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{
-    Field, JointCommand, ObjectTruth, Payload, RobotState, RobotTruth, Scalar, Sensors, TeamCommand,
-    TeamState,
-};
+use mikoshi_ipc_types::{Field, Scalar};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-const ENCODING: &str = "mikoshi";
+pub(crate) const PROFILE: &str = "mikoshi";
+pub(crate) const ENCODING: &str = "mikoshi";
+/// The attachment that holds the [`RunSpec`].
+pub(crate) const RUN_ATTACHMENT: &str = "run.bin";
 const BUFFER_BYTES: usize = 1 << 20;
 
 /// Why a log could not be written.
@@ -47,35 +47,31 @@ impl LogWriter {
     pub fn create(path: &Path, run: &RunSpec) -> Result<Self, WriteLogError> {
         let file =
             File::create(path).map_err(|source| WriteLogError::Create { path: path.to_owned(), source })?;
-        let options = WriteOptions::new().compression(Some(Compression::Lz4)).profile("mikoshi");
+        let options = WriteOptions::new().compression(Some(Compression::Lz4)).profile(PROFILE);
         let mut writer = options.create(BufWriter::with_capacity(BUFFER_BYTES, file))?;
         let bytes = run.encode();
         writer.attach(&Attachment {
             log_time: 0,
             create_time: 0,
-            name: "run.bin".to_owned(),
+            name: RUN_ATTACHMENT.to_owned(),
             media_type: "application/octet-stream".to_owned(),
             data: Cow::Borrowed(&bytes),
         })?;
         let period_ns = (run.scenario.control_period_s * 1e9).round() as u64;
         let mut log = Self { writer, channels: BTreeMap::new(), period_ns };
         let names: Vec<&str> = run.robots.iter().map(|robot| robot.member.name.as_str()).collect();
-        log.add_channels::<Sensors>(&names)?;
-        log.add_channels::<ObjectTruth>(&["team"])?;
-        log.add_channels::<RobotTruth>(&names)?;
-        log.add_channels::<RobotState>(&names)?;
-        log.add_channels::<TeamCommand>(&names)?;
-        log.add_channels::<TeamState>(&["team"])?;
-        log.add_channels::<JointCommand>(&names)?;
+        for kind in Kind::ALL {
+            log.add_channels(kind, if kind.is_per_robot { &names } else { &["team"] })?;
+        }
         Ok(log)
     }
 
-    fn add_channels<P: Payload>(&mut self, names: &[&str]) -> Result<(), WriteLogError> {
-        let schema = self.writer.add_schema(P::TYPE_NAME, ENCODING, schema_of(P::FIELDS).as_bytes())?;
+    fn add_channels(&mut self, kind: &Kind, names: &[&str]) -> Result<(), WriteLogError> {
+        let schema = self.writer.add_schema(kind.type_name, ENCODING, schema_of(kind.fields).as_bytes())?;
         for (robot, name) in names.iter().enumerate() {
-            let topic = format!("{}/{name}", P::NAME);
+            let topic = format!("{}/{name}", kind.name);
             let channel = self.writer.add_channel(schema, &topic, ENCODING, &BTreeMap::new())?;
-            self.channels.insert((P::NAME, robot), channel);
+            self.channels.insert((kind.name, robot), channel);
         }
         Ok(())
     }
@@ -119,7 +115,7 @@ impl LogWriter {
 }
 
 /// One line a field: name, type, offset, size in bytes.
-fn schema_of(fields: &[Field]) -> String {
+pub(crate) fn schema_of(fields: &[Field]) -> String {
     let mut schema = String::new();
     for field in fields {
         let scalar = match field.scalar {

@@ -1,6 +1,8 @@
 //! A run is a function of its scenario and its seed, whether in one thread or in a process per service.
 
-use mikoshi_tests::log::Log;
+use mikoshi_ipc_types::{JointCommand, Payload};
+use mikoshi_observation::{LogHash, LogReader, Observation};
+use mikoshi_tests::log::{Log, Message};
 use mikoshi_tests::run::{Results, run};
 use mikoshi_tests::scenarios::{SHORT, of_project};
 use std::fs;
@@ -30,12 +32,24 @@ fn one_thread_and_six_processes_give_the_same_bytes_twice_each() {
 #[test]
 fn one_flipped_bit_of_one_frame_is_found_and_named() {
     let log = Log::read(&hold_for_a_moment(&["--in-process"]).log());
-    let place =
-        log.messages.iter().position(|message| message.topic == "joint-command/C" && message.tick == 77);
+    let is_it =
+        |message: &Message| (message.name, message.robot, message.tick) == (JointCommand::NAME, 2, 77);
+    let place = log.messages.iter().position(is_it);
     let mut flipped = log.clone();
     flipped.messages[place.expect("it was recorded")].payload[8 * 64 + 3] ^= 0b100;
     let difference = log.first_difference(&flipped).expect("it is found");
-    assert_eq!(difference, "joint-command/C of tick 77: joint_velocity_ref_rad_s");
+    assert_eq!(difference, "joint-command[2] of tick 77: joint_velocity_ref_rad_s");
+}
+
+#[test]
+fn the_log_holds_all_that_the_hash_is_of() {
+    let results = hold_for_a_moment(&["--in-process"]);
+    let mut log = LogReader::open(&results.log()).expect("the run left a log");
+    let (mut hash, mut tick) = (LogHash::default(), Observation::for_team(4));
+    while log.read_tick(&mut tick).expect("it is of this build") {
+        hash.observe(&tick);
+    }
+    assert_eq!(results.summary()["log_hash"], hash.to_hex());
 }
 
 #[test]
