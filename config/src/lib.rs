@@ -19,6 +19,7 @@ mod nearest;
 mod origin;
 pub mod robot;
 pub mod run;
+mod save;
 pub mod scenario;
 mod validate;
 
@@ -27,4 +28,5 @@ pub use load::{LoadedRobot, LoadedScenario, load_robot, load_scenario};
 pub use origin::Origin;
 pub use robot::RobotConfig;
 pub use run::{DecodeRunError, RobotSpec, RunSpec};
+pub use save::{SaveScenarioError, save_scenario};
 pub use scenario::Scenario;

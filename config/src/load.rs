@@ -52,7 +52,8 @@ impl LoadedRobot {
 }
 
 /// Loads `DIR/scenarios/NAME.toml`, the team that it names from `DIR/teams` beneath it, `overrides` and
-/// `seed` above it, and the robots from `DIR/robots`.
+/// `seed` above it, and the robots from `DIR/robots`. Of a scenario that was saved with its robots, it
+/// takes those, from `NAME.robots` beside it.
 ///
 /// An override is a key's full path and a value: TOML, or a string that needs no quotes. An empty value
 /// takes the key away: `("hybrid.start_s", "")` leaves hybrid control off.
@@ -70,6 +71,8 @@ pub fn load_scenario(
         let team =
             find(&sibling(path, "teams"), team).map_err(|problem| document.key_error("team", problem))?;
         document = document.over(Node::read(&team)?);
+    } else if document.get("team").or(document.get("robots")).is_none() {
+        return Err(document.key_error("team", "found nothing, expected a team, or robots here").into());
     }
     for (key, value) in overrides.iter().filter(|(key, _)| key != "team") {
         apply(&mut document, key, value)?;
@@ -80,7 +83,9 @@ pub fn load_scenario(
     }
 
     let scenario: Scenario = decode(&document)?;
-    let models = load_models(&sibling(path, "robots"), &scenario, &document)?;
+    let saved_robots = Some(robots_beside(path)).filter(|folder| folder.is_dir());
+    let robots = saved_robots.unwrap_or_else(|| sibling(path, "robots"));
+    let models = load_models(&robots, &scenario, &document)?;
     let configs: Vec<_> = scenario.robots.iter().map(|member| &models[&member.model].config).collect();
     refuse(&document, validate::scenario(&scenario, &configs))?;
     Ok(LoadedScenario { scenario, models, document })
@@ -144,6 +149,11 @@ fn refuse(document: &Node, violations: Vec<Violation>) -> Result<(), LoadConfigE
     let errors =
         violations.into_iter().map(|violation| document.key_error(&violation.key, violation.problem));
     Err(LoadConfigError::CheckKeys(errors.collect()))
+}
+
+/// Where the robots of a saved scenario are.
+pub(crate) fn robots_beside(scenario: &Path) -> PathBuf {
+    scenario.with_extension("robots")
 }
 
 /// The folder `name` beside the scenario's folder.

@@ -12,8 +12,9 @@ pub struct Scenario {
     pub name: String,
     /// What it shows, in a sentence.
     pub description: String,
-    /// The team's file in `config/teams`, without `.toml`.
-    pub team: String,
+    /// The team's file in `config/teams`, without `.toml`; none where the scenario says it all itself.
+    #[serde(default)]
+    pub team: Option<String>,
     /// Simulated time.
     pub duration_s: f64,
     /// Seed of everything random; `--seed` overrides it.

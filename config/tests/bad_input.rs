@@ -149,7 +149,12 @@ fn missing_keys_are_named_where_they_belong() {
         "teams/pair.toml:1: object.mass_kg: found nothing, expected a value",
     );
     file_gives(TEAM, "x_m = 0.5", "", "teams/pair.toml:17: robots.1.x_m: found nothing, expected a value");
-    file_gives(SCENARIO, "team = \"pair\"", "", "scenarios/lift.toml: team: found nothing, expected a value");
+    file_gives(
+        SCENARIO,
+        "team = \"pair\"",
+        "",
+        "scenarios/lift.toml: team: found nothing, expected a team, or robots here",
+    );
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Encoded runs: what is written is what is read, and hostile bytes give errors.
 
 use mikoshi_config::scenario::{Control, Grasp, InternalForces};
-use mikoshi_config::{DecodeRunError, RobotSpec, RunSpec, load_scenario};
+use mikoshi_config::{DecodeRunError, RobotSpec, RunSpec, Scenario, load_scenario, save_scenario};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use std::path::Path;
@@ -50,6 +50,30 @@ fn a_run_survives_encoding() {
     run.scenario.hybrid.axes[0].control = Control::Position;
     run.scenario.hybrid.start_s = None;
     assert_eq!(RunSpec::decode(&run.encode()).unwrap(), run);
+}
+
+#[test]
+fn a_saved_scenario_is_whole_and_gives_the_same_scenario_and_robots() {
+    let (mut run, folder) = (run(), tempfile::tempdir().unwrap());
+    run.scenario.hybrid.internal_forces = InternalForces::Matrix(vec![vec![0.5, -0.5]]);
+    run.scenario.hybrid.start_s = None;
+    run.scenario.placement.fifo_priority = Some(10);
+    let path = folder.path().join("run/scenario.toml");
+    std::fs::create_dir(path.parent().unwrap()).unwrap();
+    save_scenario(&run, &path).unwrap();
+    let loaded = load_scenario(&path, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(loaded.scenario, Scenario { team: None, ..run.scenario.clone() });
+    for robot in &run.robots {
+        let model = &loaded.models[&robot.member.model];
+        assert_eq!((&model.config, &model.urdf), (&robot.config, &robot.urdf));
+    }
+    // It can be changed like any other.
+    let heavier = [("object.mass_kg".to_owned(), "4.5".to_owned())];
+    assert_eq!(load_scenario(&path, &heavier, Some(9)).unwrap().scenario.object.mass_kg, 4.5);
+
+    let nowhere = folder.path().join("nowhere/scenario.toml");
+    let error = save_scenario(&run, &nowhere).unwrap_err().to_string();
+    assert!(error.contains("nowhere/scenario.toml: cannot be written"), "{error}");
 }
 
 #[test]

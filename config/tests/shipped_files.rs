@@ -46,7 +46,7 @@ fn every_scenario_is_called_as_its_file() {
 fn every_team_can_run_the_hold_scenario() {
     for team in names_in("teams") {
         let scenario = load("hold", &[("team", &team)]).scenario;
-        assert_eq!(scenario.team, team);
+        assert_eq!(scenario.team, Some(team));
         assert_eq!(scenario.ticks(), 4400);
         assert_eq!(scenario.substeps(), 5);
     }

@@ -30,7 +30,7 @@ mod world;
 
 pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
 pub use participant::{BridgeParticipant, BuildBridgeError};
-pub use world::World;
+pub use world::{World, world_xml};
 
 /// Standard gravity as the simulated world has it.
 pub const GRAVITY_M_S2: f64 = 9.81;

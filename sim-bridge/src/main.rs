@@ -3,7 +3,8 @@
 use clap::Parser;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_process::{ServeError, ServiceArguments, serve};
-use mikoshi_sim_bridge::{BridgeParticipant, BuildBridgeError};
+use mikoshi_resolution::write_world;
+use mikoshi_sim_bridge::{BridgeParticipant, world_xml};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -12,9 +13,12 @@ fn main() -> ExitCode {
         &directory,
         |_| Ok(ServiceId::Bridge),
         |run, transport| {
-            BridgeParticipant::new(run, transport).map_err(|error| match error {
-                BuildBridgeError::World(problem) => ServeError::configuration(problem),
-                BuildBridgeError::Connect(problem) => ServeError::fault(problem),
+            // Before the simulator sees it: if it rejects the world, one wants to look at it.
+            let xml = world_xml(run).map_err(ServeError::configuration)?;
+            write_world(&directory, &xml).map_err(ServeError::fault)?;
+            BridgeParticipant::new(run, transport).map_err(|error| match error.is_fault() {
+                true => ServeError::fault(error),
+                false => ServeError::configuration(error),
             })
         },
     )

@@ -16,6 +16,13 @@ pub enum BuildBridgeError {
     Connect(#[from] ConnectError),
 }
 
+impl BuildBridgeError {
+    /// Whether the system is to blame, and not the run that was asked for.
+    pub fn is_fault(&self) -> bool {
+        matches!(self, Self::Connect(_) | Self::World(BuildWorldError::Simulator(_)))
+    }
+}
+
 /// The simulated world with its ports.
 pub struct BridgeParticipant<T: Transport> {
     world: World,

@@ -1,6 +1,6 @@
 //! The world of a run, tick by tick.
 
-use crate::grasp::{self, Spring};
+use crate::grasp::{self, GraspSite, Spring};
 use crate::layout::Layout;
 use crate::readings::{self, Noise};
 use crate::robot::Robot;
@@ -21,7 +21,6 @@ use nalgebra::Vector3;
 /// unfiltered; where a frame says so, they are averaged over all physics steps of the tick.
 pub struct World {
     data: MjData<Box<MjModel>>,
-    xml: String,
     layout: Layout,
     spring: Option<Spring>,
     noise: Vec<Option<Noise>>,
@@ -51,6 +50,32 @@ struct Scratch {
     simulator_state: Box<[f64]>,
 }
 
+/// What a world is made from.
+struct Description<'a> {
+    robots: Vec<Robot<'a>>,
+    grasps: Vec<GraspSite>,
+    spring: Option<Spring>,
+    xml: String,
+}
+
+impl<'a> Description<'a> {
+    fn of(run: &'a RunSpec) -> Result<Self, BuildWorldError> {
+        let robots = run.robots.iter().map(Robot::resolve).collect::<Result<Vec<_>, _>>()?;
+        let grasps = grasp::sites(&run.scenario, &robots);
+        let spring = Spring::of(&run.scenario, grasps.len())?;
+        let xml = mjcf::world(&run.scenario, &robots, &grasps);
+        Ok(Self { robots, grasps, spring, xml })
+    }
+}
+
+/// A run's world in MuJoCo's language.
+///
+/// # Errors
+/// A run that no world can be described for; whether the simulator takes it is another question.
+pub fn world_xml(run: &RunSpec) -> Result<String, BuildWorldError> {
+    Description::of(run).map(|description| description.xml)
+}
+
 /// How long the world comes to rest before tick 0.
 const SETTLING_S: f64 = 1.0;
 
@@ -78,10 +103,7 @@ impl World {
                 ),
             });
         }
-        let robots = run.robots.iter().map(Robot::resolve).collect::<Result<Vec<_>, _>>()?;
-        let grasps = grasp::sites(scenario, &robots);
-        let spring = Spring::of(scenario, grasps.len())?;
-        let xml = mjcf::world(scenario, &robots, &grasps);
+        let Description { robots, grasps, spring, xml } = Description::of(run)?;
         let simulator = |error: &dyn core::fmt::Display| BuildWorldError::Simulator(error.to_string());
         let model = MjModel::from_xml_string(&xml).map_err(|error| simulator(&error))?;
         let layout = Layout::of(&model, &robots, &grasps)?;
@@ -116,7 +138,7 @@ impl World {
             hand_wrenches: vec![[Wrench::zero(); MAX_HANDS]; robots.len()].into(),
             simulator_state: vec![0.0; state_size].into(),
         };
-        let mut world = Self { data, xml, layout, spring, noise, substeps, depth, state, scratch };
+        let mut world = Self { data, layout, spring, noise, substeps, depth, state, scratch };
         world.settle(scenario.physics.step_s)?;
         // Readings from before tick 0 are those of tick 0.
         for ring in world.state.readings.chunks_exact_mut(depth) {
@@ -124,11 +146,6 @@ impl World {
             ring.fill(first);
         }
         Ok(world)
-    }
-
-    /// The world in MuJoCo's language.
-    pub fn xml(&self) -> &str {
-        &self.xml
     }
 
     /// Number of robots.

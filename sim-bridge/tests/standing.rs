@@ -4,7 +4,7 @@
 mod common;
 
 use common::{constant_commands, look, pose, standing_team};
-use mikoshi_sim_bridge::World;
+use mikoshi_sim_bridge::{World, world_xml};
 
 /// 10 s; the largest horizontal displacement of a sole.
 fn stand(scenario: &str) -> f64 {
@@ -60,9 +60,8 @@ fn teams_of_any_size_stand_at_tick_0_and_touch_nothing_but_object_and_ground() {
 #[test]
 fn neighbours_in_a_robot_and_a_grasping_hand_with_the_object_may_touch() {
     let run = standing_team("hold", &[("team", "two")]);
-    let world = World::new(&run).expect("a world");
-    let may_touch =
-        |a: &str, b: &str| world.xml().contains(&format!(r#"<exclude body1="{a}" body2="{b}"/>"#));
+    let xml = world_xml(&run).expect("a world");
+    let may_touch = |a: &str, b: &str| xml.contains(&format!(r#"<exclude body1="{a}" body2="{b}"/>"#));
     // Nothing between the waist and the thigh has a shape, though two bodies lie between them.
     assert!(may_touch("A/BODY", "A/RLEG_JOINT2") && may_touch("B/BODY", "B/CHEST_JOINT1"));
     assert!(may_touch("A/r_wrist_sensor+", "object"));

@@ -85,6 +85,16 @@ impl Results {
         self.path().join("run.mcap")
     }
 
+    /// The scenario, to be run again.
+    pub fn scenario(&self) -> PathBuf {
+        self.path().join("scenario.toml")
+    }
+
+    /// The world in the simulator's language.
+    pub fn world(&self) -> PathBuf {
+        self.path().join("world.xml")
+    }
+
     /// What the run came to.
     pub fn summary(&self) -> Value {
         let text = fs::read_to_string(self.path().join("summary.json")).expect("it has ended");

@@ -13,7 +13,7 @@ mod schedule;
 mod surface;
 
 pub use error::ResolveRunError;
-pub use run_file::{RunFileError, read_run, write_run};
+pub use run_file::{RunFileError, read_run, world_file, write_run, write_world};
 pub use schedule::tick_schedule;
 
 use mikoshi_config::{LoadedScenario, RunSpec};

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// Its name in the run's directory.
 const RUN_FILE: &str = "run.bin";
+/// The world's description, by its side.
+const WORLD_FILE: &str = "world.xml";
 
 /// Why a run can't be passed on.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +27,20 @@ pub enum RunFileError {
 pub fn write_run(directory: &Path, run: &RunSpec) -> Result<(), RunFileError> {
     let path = directory.join(RUN_FILE);
     fs::write(&path, run.encode()).map_err(|source| RunFileError::Io { path, source })
+}
+
+/// Writes the description of a run's world, in the simulator's language, for people.
+///
+/// # Errors
+/// The file can't be written.
+pub fn write_world(directory: &Path, xml: &str) -> Result<(), RunFileError> {
+    let path = world_file(directory);
+    fs::write(&path, xml).map_err(|source| RunFileError::Io { path, source })
+}
+
+/// Where [`write_world`] puts it; there is none before the world has been described.
+pub fn world_file(directory: &Path) -> PathBuf {
+    directory.join(WORLD_FILE)
 }
 
 /// Reads the run of a directory.

@@ -22,7 +22,7 @@ Exit status:
   0  the run met its scenario's thresholds
   1  it did not: a robot fell, a figure out of bounds
   2  bad usage or configuration
-  3  a fault of the system: a process died, no shared memory, no simulator
+  3  a fault of the system: a process died or froze, no shared memory, no simulator
   130, 143  interrupted, terminated";
 
 /// A team of humanoid robots carries one object.

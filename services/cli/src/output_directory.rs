@@ -9,10 +9,13 @@ use std::path::{Path, PathBuf};
 /// Where runs go that nobody gave a place.
 const DEFAULT_PARENT: &str = "runs";
 /// Whatever a run leaves, by which a folder with results is recognised and cleared.
-const RESULTS: [&str; 4] = [RUN_LOG, SUMMARY, SCENARIO, SERVICE_LOGS];
+const RESULTS: [&str; 6] = [RUN_LOG, SUMMARY, SCENARIO, ROBOTS, WORLD, SERVICE_LOGS];
 const RUN_LOG: &str = "run.mcap";
 const SUMMARY: &str = "summary.json";
 const SCENARIO: &str = "scenario.toml";
+/// Beside [`SCENARIO`], by its name.
+const ROBOTS: &str = "scenario.robots";
+const WORLD: &str = "world.xml";
 const SERVICE_LOGS: &str = "logs";
 
 /// A folder that belongs to this run until it is dropped.
@@ -112,7 +115,12 @@ impl OutputDirectory {
         self.path.join(SUMMARY)
     }
 
-    /// The scenario as it was run.
+    /// The world in the simulator's language.
+    pub fn world(&self) -> PathBuf {
+        self.path.join(WORLD)
+    }
+
+    /// The scenario as it was run, to be run again; its robots lie beside it.
     pub fn scenario(&self) -> PathBuf {
         self.path.join(SCENARIO)
     }

@@ -3,19 +3,20 @@
 
 use crate::binaries;
 use crate::children::{Children, Ended, ServiceProcess};
-use crate::failure::{Failure, Status};
+use crate::failure::{Failure, Status, as_lines};
 use crate::interrupts::Interrupts;
 use crate::observer::RunObserver;
 use crate::outcome::{Outcome, fault_of, label_of, robot_name};
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
+use crate::print::print_error;
 use crate::standstill::Standstill;
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Fault, Observation, TeamTap};
-use mikoshi_resolution::write_run;
+use mikoshi_resolution::{world_file, write_run};
 use mikoshi_runtime::{
     Board, Domain, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State, TickError,
     WaitPolicy, required_bytes,
@@ -49,6 +50,13 @@ pub fn supervise(
     let mut supervisor = Supervisor::start(prepared, directory.path(), &out.service_logs())?;
     let watched = supervisor.watch(prepared, observer, &interrupts);
     let outcome = supervisor.conclude(&prepared.run, watched);
+    let world = world_file(directory.path());
+    if world.exists()
+        && let Err(error) = fs::copy(&world, out.world())
+    {
+        // The run's results are worth more than this one.
+        print_error(&as_lines("warning", &format!("{}: {error}", out.world().display())));
+    }
     if matches!(outcome, Outcome::Completed) {
         remove_empty_logs(&out.service_logs());
     }

@@ -4,7 +4,7 @@ use mikoshi_ipc_types::{JointCommand, Payload};
 use mikoshi_observation::{LogHash, LogReader, Observation};
 use mikoshi_tests::log::{Log, Message};
 use mikoshi_tests::run::{Results, run};
-use mikoshi_tests::scenarios::{SHORT, of_project};
+use mikoshi_tests::scenarios::{Copy, SHORT, of_project};
 use std::fs;
 
 /// Runs the hold scenario for a moment. It can't meet its thresholds in that time.
@@ -50,6 +50,26 @@ fn the_log_holds_all_that_the_hash_is_of() {
         hash.observe(&tick);
     }
     assert_eq!(results.summary()["log_hash"], hash.to_hex());
+}
+
+#[test]
+fn what_a_run_leaves_can_be_run_again_with_the_same_bytes() {
+    let original = Copy::new();
+    let first = Results::new();
+    let arguments = [&SHORT[..], &["--seed", "3", "--set", "team=two", "--in-process"]].concat();
+    assert_eq!(run(&original.hold(), &arguments, &first).status, Some(1));
+    let world = fs::read_to_string(first.world()).expect("it was described");
+    assert!(world.starts_with("<mujoco") && world.contains("\"B/r_wrist_sensor+\""), "{world}");
+
+    // Without what it was made from, in processes, and at last in its own place.
+    drop(original);
+    let again = Results::new();
+    assert_eq!(run(&first.scenario(), &[], &again).status, Some(1));
+    let hash = first.summary()["log_hash"].clone();
+    assert_eq!(again.summary()["log_hash"], hash);
+    assert_eq!(fs::read_to_string(again.world()).expect("it was described"), world);
+    assert_eq!(run(&first.scenario(), &["--force", "--in-process"], &first).status, Some(1));
+    assert_eq!(first.summary()["log_hash"], hash);
 }
 
 #[test]

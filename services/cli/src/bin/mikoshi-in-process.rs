@@ -7,14 +7,16 @@ use mikoshi::failure::{Failure, Status};
 use mikoshi::interrupts::Interrupts;
 use mikoshi::observer::RunObserver;
 use mikoshi::outcome::Outcome;
+use mikoshi::output_directory::OutputDirectory;
 use mikoshi::prepare::Prepared;
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Observation, TeamTap};
 use mikoshi_runtime::{InMemoryHub, Participant, run_in_one_thread};
 use mikoshi_servo::ServoParticipant;
-use mikoshi_sim_bridge::BridgeParticipant;
+use mikoshi_sim_bridge::{BridgeParticipant, BuildBridgeError, world_xml};
 use mujoco_rs::mujoco_version;
+use std::fs;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -22,12 +24,18 @@ fn main() -> ExitCode {
 }
 
 fn run_in_process(arguments: &RunArguments) -> Result<Status, Failure> {
-    run(arguments, |prepared, _, observer| execute(prepared, observer))
+    run(arguments, execute)
 }
 
-fn execute(prepared: &Prepared, observer: &mut RunObserver) -> Result<Outcome, Failure> {
+fn execute(
+    prepared: &Prepared,
+    out: &OutputDirectory,
+    observer: &mut RunObserver,
+) -> Result<Outcome, Failure> {
     let interrupts = Interrupts::listen().map_err(Failure::fault)?;
     let (run, hub) = (&prepared.run, InMemoryHub::new(prepared.schedule.clone()));
+    let xml = world_xml(run).map_err(Failure::usage)?;
+    fs::write(out.world(), xml).map_err(|error| Failure::fault(error).context(out.world().display()))?;
     let mut team_tap = TeamTap::new(&hub.tap(), run.robots.len()).map_err(Failure::fault)?;
     let mut participants = participants(prepared, &hub)?;
     let mut observation = Observation::for_team(run.robots.len());
@@ -57,7 +65,11 @@ fn participants(prepared: &Prepared, hub: &InMemoryHub) -> Result<Vec<Box<dyn Pa
     let build = |service: ServiceId| -> Result<Box<dyn Participant>, Failure> {
         let transport = hub.transport(service);
         Ok(match service {
-            ServiceId::Bridge => Box::new(BridgeParticipant::new(run, &transport).map_err(Failure::usage)?),
+            ServiceId::Bridge => {
+                Box::new(BridgeParticipant::new(run, &transport).map_err(|error: BuildBridgeError| {
+                    if error.is_fault() { Failure::fault(error) } else { Failure::usage(error) }
+                })?)
+            }
             ServiceId::Coordinator => {
                 Box::new(CoordinatorParticipant::new(run, &transport).map_err(Failure::usage)?)
             }

@@ -9,6 +9,7 @@ use crate::output_directory::OutputDirectory;
 use crate::prepare::{Prepared, prepare};
 use crate::print::{print_error, print_out};
 use crate::report::report;
+use mikoshi_config::save_scenario;
 use mikoshi_observation::Summary;
 use std::fs;
 
@@ -30,8 +31,7 @@ pub fn run(
         Some(path) => OutputDirectory::open(path, arguments.force)?,
         None => OutputDirectory::fresh(&scenario.name, scenario.seed)?,
     };
-    let text = toml::to_string(scenario).map_err(Failure::fault)?;
-    write(&out.scenario(), &text)?;
+    save_scenario(&prepared.run, &out.scenario()).map_err(Failure::fault)?;
 
     let mut observer = RunObserver::new(&prepared, &out, !arguments.quiet)?;
     let outcome = match execute(&prepared, &out, &mut observer) {
@@ -66,9 +66,6 @@ pub fn run(
 fn write_summary(out: &OutputDirectory, summary: &Summary) -> Result<(), Failure> {
     let mut text = serde_json::to_string_pretty(summary).map_err(Failure::fault)?;
     text.push('\n');
-    write(&out.summary(), &text)
-}
-
-fn write(path: &std::path::Path, text: &str) -> Result<(), Failure> {
-    fs::write(path, text).map_err(|error| Failure::fault(error).context(path.display()))
+    let path = out.summary();
+    fs::write(&path, text).map_err(|error| Failure::fault(error).context(path.display()))
 }
