@@ -15,6 +15,7 @@ mod document;
 mod error;
 mod grasp;
 mod load;
+mod motion;
 mod nearest;
 mod origin;
 pub mod robot;

@@ -1,7 +1,7 @@
 //! A resolved run: everything that its services need, in one file, written once and read by all.
 
 use crate::robot::RobotConfig;
-use crate::scenario::{Member, Scenario};
+use crate::scenario::{Member, Scenario, Segment};
 use crate::validate;
 use mikoshi_ipc_types::MAX_JOINTS;
 use serde::{Deserialize, Serialize};
@@ -15,6 +15,8 @@ pub struct RunSpec {
     pub robots: Vec<RobotSpec>,
     /// Number of ticks.
     pub ticks: u64,
+    /// The object's reference velocity, drawn segments included.
+    pub motion: Vec<Segment>,
 }
 
 /// One robot of the run.
@@ -39,7 +41,7 @@ pub struct RobotSpec {
 /// Opens every encoded run.
 const MAGIC: [u8; 8] = *b"MIKOSHI\0";
 /// Counts changes of the schema.
-const SCHEMA_VERSION: u32 = 1;
+const SCHEMA_VERSION: u32 = 2;
 /// Sixteen robots with a megabyte of URDF each fit four times; a decoder claims no more memory.
 const MAX_BYTES: usize = 64 << 20;
 /// Magic, version, BLAKE3 of what follows.
@@ -135,6 +137,12 @@ impl RunSpec {
         )?;
         let members = self.robots.iter().map(|robot| &robot.member);
         require(members.eq(&self.scenario.robots), "robots", "they are not the scenario's")?;
+        let is_finite = |segment: &Segment| {
+            let velocities = segment.velocity_m_s.iter().chain(&segment.angular_velocity_rad_s);
+            segment.duration_s > 0.0
+                && velocities.chain([&segment.duration_s]).all(|number| number.is_finite())
+        };
+        require(self.motion.iter().all(is_finite), "motion", "a segment that is not finite")?;
         for robot in &self.robots {
             let hands = validate::grasping_hands(&robot.member, &robot.config);
             require(

@@ -1,6 +1,7 @@
 //! A scenario: what a team does, with what, for how long, and when that counts as success.
 
 pub use crate::grasp::Grasp;
+pub use crate::motion::{Motion, RandomMotion, Segment};
 use serde::{Deserialize, Serialize};
 
 /// One run, as `config/scenarios/*.toml` describe it. The team's file lies underneath: what the
@@ -33,6 +34,15 @@ pub struct Scenario {
     pub grasp: Grasp,
     /// The hybrid law.
     pub hybrid: Hybrid,
+    /// How the object is asked to move; it stays when absent.
+    #[serde(default)]
+    pub motion: Option<Motion>,
+    /// How robots step.
+    #[serde(default)]
+    pub gait: Gait,
+    /// How robots keep their balance.
+    #[serde(default)]
+    pub balance: Balance,
     /// The simulated world.
     #[serde(default)]
     pub physics: Physics,
@@ -55,7 +65,12 @@ impl Scenario {
 
     /// Tick at which the hybrid law starts; `None` if it never does.
     pub fn hybrid_start_tick(&self) -> Option<u64> {
-        self.hybrid.start_s.map(|start_s| (start_s / self.control_period_s).round() as u64)
+        self.hybrid.start_s.map(|start_s| self.tick_at(start_s))
+    }
+
+    /// The tick nearest to this time.
+    pub fn tick_at(&self, time_s: f64) -> u64 {
+        (time_s / self.control_period_s).round() as u64
     }
 
     /// Number of physics steps in a tick.
@@ -122,6 +137,41 @@ pub struct Hybrid {
     /// Exceptions to "the object by position, internal forces by force to zero".
     #[serde(default)]
     pub axes: Vec<AxisControl>,
+}
+
+/// How robots step, all on common ticks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Gait {
+    /// Weight shift between two steps.
+    pub double_support_s: f64,
+    /// Swing.
+    pub single_support_s: f64,
+    /// How high a swinging foot is lifted.
+    pub lift_m: f64,
+    /// Robots that face back swing the other foot, so that the team sways to one side together.
+    pub mirror_opposed: bool,
+}
+
+impl Default for Gait {
+    fn default() -> Self {
+        Self { double_support_s: 0.2, single_support_s: 0.6, lift_m: 0.05, mirror_opposed: true }
+    }
+}
+
+/// How robots keep their balance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Balance {
+    /// Whether feet give way to what the centre of mass and the ground do; without, the gait's
+    /// references are followed as they are.
+    pub stabiliser: bool,
+}
+
+impl Default for Balance {
+    fn default() -> Self {
+        Self { stabiliser: true }
+    }
 }
 
 /// The rows of C.
@@ -218,11 +268,17 @@ pub struct Thresholds {
     pub internal_after_3s_nm: Option<f64>,
     pub internal_end_n: Option<f64>,
     pub internal_end_nm: Option<f64>,
+    pub internal_peak_n: Option<f64>,
+    pub object_position_rms_m: Option<f64>,
     pub object_position_peak_m: Option<f64>,
+    pub object_attitude_rms_rad: Option<f64>,
     pub object_attitude_peak_rad: Option<f64>,
+    pub object_travel_min_m: Option<f64>,
+    pub object_travel_min_rad: Option<f64>,
     pub foot_slip_max_m: Option<f64>,
     pub joint_margin_min_rad: Option<f64>,
     pub saturated_ticks_max: Option<u64>,
+    pub saturated_share_max: Option<f64>,
     pub zmp_margin_min_m: Option<f64>,
 }
 

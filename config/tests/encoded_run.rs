@@ -24,7 +24,7 @@ fn run() -> RunSpec {
         }
     };
     let robots = loaded.scenario.robots.iter().map(spec).collect();
-    RunSpec { ticks: loaded.scenario.ticks(), robots, scenario: loaded.scenario }
+    RunSpec { ticks: loaded.scenario.ticks(), robots, scenario: loaded.scenario, motion: vec![] }
 }
 
 /// `content` under a header that vouches for it.

@@ -18,14 +18,24 @@ pub type TwistWire = [f64; 6];
 pub mod mode {
     /// Commands are constant; nothing is controlled but each robot's own balance.
     pub const HOLD: u64 = 1;
-    /// The hybrid law controls object and internal forces.
-    pub const HYBRID: u64 = 2;
+    /// The hybrid law controls object and internal forces; the team may walk.
+    pub const CARRY: u64 = 2;
     /// A fault ended the run: every command is constant.
     pub const SAFE_STOP: u64 = 3;
+    /// Open hands move to where they will grasp.
+    pub const APPROACH: u64 = 4;
+    /// Hands close on the resting object.
+    pub const GRASP: u64 = 5;
+    /// As [`CARRY`], on the way up from where the object rested; nobody walks.
+    pub const LIFT: u64 = 6;
+    /// As [`CARRY`], on the way down to where the object shall rest; nobody walks.
+    pub const LOWER: u64 = 7;
+    /// Hands open and draw back.
+    pub const RELEASE: u64 = 8;
 
     /// Whether the hybrid law is at work.
     pub const fn is_hybrid(mode: u64) -> bool {
-        mode == HYBRID
+        matches!(mode, CARRY | LIFT | LOWER)
     }
 }
 
@@ -39,6 +49,14 @@ pub mod flag {
     pub const HANDS_BEHIND: u64 = 1 << 2;
     /// An input of this tick was unusable; the command is the last good one.
     pub const INPUT_REJECTED: u64 = 1 << 3;
+    /// The robot wants to take a step.
+    pub const WANTS_STEP: u64 = 1 << 4;
+    /// The robot could stand after the step that starts next.
+    pub const CAN_STOP: u64 = 1 << 5;
+    /// Its foot may leave the ground at the next lift-off.
+    pub const READY_TO_STEP: u64 = 1 << 6;
+    /// It would swing the team's left foot first.
+    pub const LEFT_FIRST: u64 = 1 << 7;
 }
 
 payload! {
@@ -59,6 +77,8 @@ payload! {
         pub imu_angular_velocity_rad_s: [f64; 3],
         /// Accelerometer (specific force: it reads +9.81 upwards at rest), in the IMU's axes.
         pub imu_specific_force_m_s2: [f64; 3],
+        /// Bit h: grasping hand h holds the object.
+        pub holding_hands: u64,
     }
 }
 
@@ -86,6 +106,14 @@ payload! {
         pub joint_margin_min_rad: f64,
         /// Largest distance between a hand's reference and what the IK achieved.
         pub hand_error_max_m: f64,
+        /// Largest foot error (eq. 40) at the next landing, as a multiple of its starting threshold.
+        pub step_urgency: f64,
+        /// Share of its speed that the object may keep without leaving this robot's feet behind, 0 to 1.
+        pub speed_share: f64,
+        /// Steps taken since tick 0.
+        pub steps: u64,
+        /// Bit h: grasping hand h holds the object.
+        pub holding_hands: u64,
         /// Bits of [`flag`].
         pub flags: u64,
     }
@@ -99,6 +127,12 @@ payload! {
         pub hand_pose_ref: [PoseWire; MAX_HANDS],
         /// Reference twist of each hand in the world.
         pub hand_twist_ref: [TwistWire; MAX_HANDS],
+        /// Wrench that each hand is expected to apply to the object, at the hand's origin, in world axes.
+        pub hand_wrench_ref: [WrenchWire; MAX_HANDS],
+        /// The team's step clock: kind, step index, tick, flags.
+        pub step_clock: [u64; 4],
+        /// Bit h: grasping hand h shall hold the object.
+        pub closed_hands: u64,
         /// One of [`mode`].
         pub team_mode: u64,
         /// Tick of the robot states that this command is computed from.
@@ -114,6 +148,8 @@ payload! {
         pub joint_position_ref_rad: [f64; MAX_JOINTS],
         /// Reference rates, for the drives' velocity feed-forward.
         pub joint_velocity_ref_rad_s: [f64; MAX_JOINTS],
+        /// Bit h: grasping hand h shall hold the object.
+        pub closed_hands: u64,
         /// Tick of the team command that this command is computed from.
         pub team_command_tick: u64,
     }
@@ -131,6 +167,12 @@ payload! {
         pub object_pose: PoseWire,
         /// Reference object pose.
         pub object_pose_ref: PoseWire,
+        /// Reference object twist, after the governor.
+        pub object_twist_ref: TwistWire,
+        /// Share of the operator's velocity that the slowest robot allows (Fig. 10b), 0 to 1.
+        pub speed_share: f64,
+        /// The team's step clock: kind, step index, tick, flags.
+        pub step_clock: [u64; 4],
         /// One of [`mode`].
         pub team_mode: u64,
     }

@@ -33,6 +33,12 @@ impl Checks {
         self.require(value.is_finite(), key, value, "a finite number");
     }
 
+    pub fn finite_numbers(&mut self, key: &str, values: &[f64]) {
+        for (index, value) in values.iter().enumerate() {
+            self.finite(format_args!("{key}.{index}"), *value);
+        }
+    }
+
     /// Letters, digits, `_` and `-`: names become parts of file and service names.
     pub fn name(&mut self, key: impl Display, name: &str) {
         let fits = (1..=64).contains(&name.len())

@@ -2,7 +2,7 @@
 
 use super::checks::{Checks, Violation};
 use crate::robot::RobotConfig;
-use crate::scenario::{Grasp, InternalForces, Member, Scenario};
+use crate::scenario::{Grasp, InternalForces, Member, Motion, Scenario};
 use mikoshi_ipc_types::MAX_ROBOTS;
 use std::collections::BTreeSet;
 
@@ -46,6 +46,12 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     grasp(&mut checks, &scenario.grasp);
     let arms = team(&mut checks, &scenario.robots, configs);
     hybrid(&mut checks, scenario, arms);
+    if let Some(of_object) = &scenario.motion {
+        motion(&mut checks, of_object, scenario);
+    }
+    checks.positive("gait.double_support_s", scenario.gait.double_support_s);
+    checks.positive("gait.single_support_s", scenario.gait.single_support_s);
+    checks.positive("gait.lift_m", scenario.gait.lift_m);
     checks.not_negative("physics.friction", scenario.physics.friction);
     let sensors = &scenario.sensors;
     checks.not_negative("sensors.force_noise_n", sensors.force_noise_n);
@@ -168,6 +174,39 @@ fn hybrid(checks: &mut Checks, scenario: &Scenario, arms: Option<usize>) {
     }
 }
 
+fn motion(checks: &mut Checks, motion: &Motion, scenario: &Scenario) {
+    checks.not_negative("motion.start_s", motion.start_s);
+    if let Some(start_s) = scenario.hybrid.start_s {
+        let expected = format!("a time from hybrid.start_s ({start_s} s) on");
+        checks.require(motion.start_s >= start_s, "motion.start_s", motion.start_s, expected);
+    } else {
+        let expected = "none, or a time: without the hybrid law nothing moves the object";
+        checks.require(false, "hybrid.start_s", "motion without it", expected);
+    }
+    checks.positive("motion.acceleration_m_s2", motion.acceleration_m_s2);
+    checks.positive("motion.angular_acceleration_rad_s2", motion.angular_acceleration_rad_s2);
+    for (index, segment) in motion.segments.iter().enumerate() {
+        let key = format!("motion.segments.{index}");
+        checks.positive(format_args!("{key}.duration_s"), segment.duration_s);
+        checks.finite_numbers(&format!("{key}.velocity_m_s"), &segment.velocity_m_s);
+        checks.finite_numbers(&format!("{key}.angular_velocity_rad_s"), &segment.angular_velocity_rad_s);
+    }
+    if let Some(random) = &motion.random {
+        checks.positive("motion.random.duration_s", random.duration_s);
+        checks.positive("motion.random.change_s", random.change_s);
+        let count = whole_ratio(random.duration_s, random.change_s);
+        let expected = format!("a whole number of motion.random.change_s ({} s)", random.change_s);
+        checks.require(count.is_some(), "motion.random.duration_s", random.duration_s, expected);
+        checks.finite_numbers("motion.random.travel_m", &random.travel_m);
+        checks.finite_numbers("motion.random.travel_rad", &random.travel_rad);
+        checks.finite_numbers("motion.random.deviation_m_s", &random.deviation_m_s);
+        checks.finite_numbers("motion.random.deviation_rad_s", &random.deviation_rad_s);
+    }
+    let (end_s, duration_s) = (motion.end_s(), scenario.duration_s);
+    let expected = format!("a motion that ends before the run does ({duration_s} s)");
+    checks.require(end_s <= duration_s, "motion", format_args!("one that ends at {end_s} s"), expected);
+}
+
 fn thresholds(checks: &mut Checks, scenario: &Scenario) {
     let limits = &scenario.thresholds;
     for (key, limit) in [
@@ -176,10 +215,16 @@ fn thresholds(checks: &mut Checks, scenario: &Scenario) {
         ("internal_after_3s_nm", limits.internal_after_3s_nm),
         ("internal_end_n", limits.internal_end_n),
         ("internal_end_nm", limits.internal_end_nm),
+        ("internal_peak_n", limits.internal_peak_n),
+        ("object_position_rms_m", limits.object_position_rms_m),
         ("object_position_peak_m", limits.object_position_peak_m),
+        ("object_attitude_rms_rad", limits.object_attitude_rms_rad),
         ("object_attitude_peak_rad", limits.object_attitude_peak_rad),
+        ("object_travel_min_m", limits.object_travel_min_m),
+        ("object_travel_min_rad", limits.object_travel_min_rad),
         ("foot_slip_max_m", limits.foot_slip_max_m),
         ("joint_margin_min_rad", limits.joint_margin_min_rad),
+        ("saturated_share_max", limits.saturated_share_max),
         ("zmp_margin_min_m", limits.zmp_margin_min_m),
     ] {
         if let Some(limit) = limit {

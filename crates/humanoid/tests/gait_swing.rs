@@ -105,7 +105,7 @@ fn one_noisy_sample_is_no_ground() {
 fn a_foot_whose_ground_gives_way_is_lowered_on() {
     let contacts = swing(|tick| if (95..105).contains(&tick) { 200.0 } else { 0.0 }, TICKS);
     let SwingContact::Landed { at } = contacts[104] else { panic!("{:?}", contacts[104]) };
-    let SwingContact::Lowering { at: lower, .. } = contacts[110] else { panic!("{:?}", contacts[110]) };
+    let SwingContact::Lowering { at: lower } = contacts[110] else { panic!("{:?}", contacts[110]) };
     assert!(lower.height < at.height);
     assert_eq!(lower.pose, at.pose);
 }
@@ -116,7 +116,7 @@ fn late_contact_lowers_slowly_until_the_ground_is_there() {
     let heights: Vec<f64> = contacts
         .iter()
         .filter_map(|contact| match contact {
-            SwingContact::Lowering { at, .. } | SwingContact::Landed { at } => Some(at.height),
+            SwingContact::Lowering { at } | SwingContact::Landed { at } => Some(at.height),
             SwingContact::Swinging { .. } => None,
         })
         .collect();
@@ -128,13 +128,13 @@ fn late_contact_lowers_slowly_until_the_ground_is_there() {
 #[test]
 fn a_foot_that_finds_no_ground_stops_at_its_bound() {
     let contacts = swing(|_| 0.0, TICKS + 1000);
-    let Some(SwingContact::Lowering { at, .. }) = contacts.last() else { panic!("no ground, no landing") };
+    let Some(SwingContact::Lowering { at }) = contacts.last() else { panic!("no ground, no landing") };
     assert_eq!(at.height, -config().lowering_max_m);
 }
 
 #[test]
 fn a_foot_at_its_bound_has_no_speed() {
     let at = Foothold { height: -config().lowering_max_m, ..to() };
-    let swing = Swing { contact: SwingContact::Lowering { at, force_ticks: 0 }, ..Swing::new(from(), to()) };
+    let swing = Swing { contact: SwingContact::Lowering { at }, ..Swing::new(from(), to()) };
     assert_eq!(swing.foot(&config(), 1.01, DURATION).1.linear.z, 0.0);
 }

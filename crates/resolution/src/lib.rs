@@ -7,6 +7,7 @@
 #![allow(non_snake_case)]
 
 mod error;
+mod motion;
 mod robot;
 mod run_file;
 mod schedule;
@@ -32,5 +33,7 @@ pub fn resolve(loaded: &LoadedScenario) -> Result<RunSpec, ResolveRunError> {
         .enumerate()
         .map(|(index, member)| resolve_robot(loaded, &models, index, member))
         .collect::<Result<_, _>>()?;
-    Ok(RunSpec { ticks: scenario.ticks(), scenario: scenario.clone(), robots })
+    let motion =
+        scenario.motion.as_ref().map_or_else(Vec::new, |motion| motion::segments(motion, scenario.seed));
+    Ok(RunSpec { ticks: scenario.ticks(), scenario: scenario.clone(), robots, motion })
 }

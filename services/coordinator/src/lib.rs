@@ -1,15 +1,17 @@
 //! The team's controller: it sees hands, and nothing of the robots behind them.
 //!
 //! Responsibilities: the grasp's geometry (virtual sticks), internal forces and selection, the hybrid
-//! law (the paper's section 3), the object's reference, team modes. It knows no joint, no leg and no
-//! simulator, reads no clock, and does no I/O: [`Coordinator::tick`] is a pure function of its state
+//! law (the paper's section 3), the object's reference, the team's step clock, team modes. It knows no
+//! joint, no leg and no simulator, reads no clock, and does no I/O: [`Coordinator::tick`] is a pure function of its state
 //! and inputs, and `main.rs` wires it to a transport.
 
 #![allow(non_snake_case)]
 
 mod build;
+mod object_motion;
 mod participant;
 mod reference;
+mod step_clock;
 mod tick;
 
 pub use build::{BuildCoordinatorError, build_hybrid_law, build_internal_forces, team_arms};

@@ -47,6 +47,7 @@ impl<T: Transport> CoordinatorParticipant<T> {
             |error| {
                 TickError::Service(match error {
                     CoordinateError::HandPose => "a hand's pose is not a pose",
+                    CoordinateError::State => "the state holds a value that no tick leaves",
                     CoordinateError::Law => "the hybrid law rejects its inputs",
                 })
             },

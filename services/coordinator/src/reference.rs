@@ -41,12 +41,13 @@ impl References {
         Ok(Self { rows, ramp_ticks: RAMP_S / scenario.control_period_s })
     }
 
-    /// Fills in h_r and z_r, `ticks` ticks after control started with the object at `X_WA_start` and the
-    /// generalized force at `force_start`: from there they go to what is asked for.
+    /// Fills in h_r and z_r for an object that shall be at `X_WA_ref`, `ticks` ticks after control started
+    /// with the generalized force at `force_start`: from there forces go to what is asked for, and axes
+    /// that are displaced go there from where they are.
     pub(crate) fn fill(
         &self,
         ticks: u64,
-        X_WA_start: &Pose<World, Object>,
+        X_WA_ref: &Pose<World, Object>,
         force_start: &[[f64; 6]],
         force: &mut GeneralizedForce,
         position: &mut GeneralizedPosition,
@@ -55,7 +56,7 @@ impl References {
         let mut rows = self.rows.iter().zip(force_start);
         if let Some((object, start)) = rows.next() {
             force.external = between(start, &object.force, share);
-            position.external = X_WA_start.displaced(&Twist::from_vector(&(object.position * share)));
+            position.external = X_WA_ref.displaced(&Twist::from_vector(&(object.position * share)));
         }
         let outputs = force.internal.iter_mut().zip(position.internal.iter_mut());
         for ((row, start), (force, position)) in rows.zip(outputs) {

@@ -1,21 +1,28 @@
 //! One tick of the team's controller. No allocation, no clock, no I/O, no panic path.
 
 use crate::build::{BuildCoordinatorError, build_hybrid_law, virtual_sticks};
+use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::reference::References;
+use crate::step_clock::{TeamClockState, Wishes, step_timing};
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_cooperation::{
     GeneralizedForce, GeneralizedPosition, HandInput, HybridInputs, HybridLaw, HybridOutput, HybridReference,
     HybridScratch, HybridState, VirtualStick,
 };
+use mikoshi_humanoid::gait::StepTiming;
 use mikoshi_ipc_types::{MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, mode};
-use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench};
+use mikoshi_spatial::{Hand, Pose, Twist, World, Wrench};
 
 /// The team's controller. Immutable.
 #[derive(Clone, Debug)]
 pub struct Coordinator {
     law: HybridLaw,
     references: References,
+    motion: ObjectMotion,
+    timing: StepTiming,
+    /// Tick at which the object is first asked to move; it never is when absent.
+    motion_start_tick: Option<u64>,
     /// Tick at which the hybrid law starts; it never does when absent.
     hybrid_start_tick: Option<u64>,
     hands_of_robots: Vec<usize>,
@@ -27,8 +34,9 @@ pub struct Coordinator {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoordinatorState {
     hybrid: HybridState<MAX_HANDS_OF_TEAM>,
-    /// Object pose by the virtual sticks when the hybrid law started.
-    object_pose_at_start: [f64; 7],
+    /// The object's reference, from where the virtual sticks saw it when the hybrid law started.
+    motion: ObjectMotionState,
+    clock: TeamClockState,
     /// Generalized force then, row by row.
     force_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// One of [`mode`].
@@ -65,6 +73,8 @@ pub struct CoordinatorOutputs {
 pub enum CoordinateError {
     #[error("a hand's pose is not a pose")]
     HandPose,
+    #[error("the state holds a value that no tick leaves")]
+    State,
     #[error("the hybrid law rejects its inputs")]
     Law,
 }
@@ -77,10 +87,14 @@ impl Coordinator {
     pub fn new(run: &RunSpec) -> Result<Self, BuildCoordinatorError> {
         let law = build_hybrid_law(run)?;
         let references = References::new(&run.scenario, law.internal_forces())?;
+        let scenario = &run.scenario;
         Ok(Self {
             law,
             references,
-            hybrid_start_tick: run.scenario.hybrid_start_tick(),
+            motion: ObjectMotion::new(run),
+            timing: step_timing(scenario),
+            motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
+            hybrid_start_tick: scenario.hybrid_start_tick(),
             hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
             sticks: virtual_sticks(run)?,
         })
@@ -93,7 +107,8 @@ impl Coordinator {
     pub fn initial_state(&self) -> Result<CoordinatorState, BuildCoordinatorError> {
         Ok(CoordinatorState {
             hybrid: HybridState::at_grasp(&self.sticks)?,
-            object_pose_at_start: Pose::<World, Object>::identity().to_array(),
+            motion: ObjectMotionState::at_rest(&Pose::identity()),
+            clock: TeamClockState::default(),
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             team_mode: mode::HOLD,
         })
@@ -118,33 +133,38 @@ impl Coordinator {
         tick: u64,
         state: &mut CoordinatorState,
         scratch: &mut CoordinatorScratch,
-        robots: impl Iterator<Item = &'a RobotState>,
+        robots: impl Iterator<Item = &'a RobotState> + Clone,
         out: &mut CoordinatorOutputs,
     ) -> Result<(), CoordinateError> {
         let CoordinatorScratch { law: law_scratch, law_output, hands, force_ref, position_ref } = scratch;
-        read_hands(robots, &self.hands_of_robots, hands)?;
+        read_hands(robots.clone(), &self.hands_of_robots, hands)?;
+        let wishes = Wishes::of(robots);
 
-        let is_hybrid = state.team_mode == mode::HYBRID;
-        let X_WA_start = Pose::from_array(&state.object_pose_at_start).ok_or(CoordinateError::Law)?;
+        let is_hybrid = mode::is_hybrid(state.team_mode);
+        let is_moving = is_hybrid && self.motion_start_tick.is_some_and(|start| tick >= start);
+        let speed_share = if is_moving { wishes.speed_share } else { 0.0 };
+        // State changes only when nothing can fail any more.
+        let mut motion = state.motion;
+        let X_WA_ref = self.motion.advance(&mut motion, speed_share).ok_or(CoordinateError::State)?;
+        let may_walk = state.team_mode == mode::CARRY;
+        let clock = state.clock.advance(&self.timing, &wishes, may_walk).ok_or(CoordinateError::State)?;
+
         let ticks_since_start = tick.saturating_sub(self.hybrid_start_tick.unwrap_or(tick));
-        self.references.fill(ticks_since_start, &X_WA_start, &state.force_at_start, force_ref, position_ref);
+        self.references.fill(ticks_since_start, &X_WA_ref, &state.force_at_start, force_ref, position_ref);
         let reference = is_hybrid.then_some(HybridReference {
             force: force_ref,
             position: position_ref,
-            object_twist: Twist::zero(),
+            object_twist: motion.twist(),
         });
         let inputs = HybridInputs { hands, reference };
         self.law
             .act(&mut state.hybrid, law_scratch, &inputs, law_output)
             .map_err(|_| CoordinateError::Law)?;
+        (state.motion, state.clock) = (motion, clock);
 
-        self.write_commands(tick, state.team_mode, law_output, out);
-        write_team_state(
-            state.team_mode,
-            law_output,
-            is_hybrid.then_some((&*force_ref, &*position_ref)),
-            out,
-        );
+        self.write_commands(tick, state, law_output, out);
+        write_team_state(state, law_output, is_hybrid.then_some((&*force_ref, &*position_ref)), out);
+        out.team_state.speed_share = speed_share;
         if state.team_mode == mode::HOLD && self.hybrid_start_tick.is_some_and(|start| tick + 1 >= start) {
             self.start_hybrid(state, hands, law_output);
         }
@@ -159,18 +179,31 @@ impl Coordinator {
         for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
             *slot = VirtualStick::at_grasp(&hand.pose, X_WA).X_HB.to_array();
         }
-        state.object_pose_at_start = X_WA.to_array();
+        state.motion = ObjectMotionState::at_rest(X_WA);
         write_force(&law.force, &mut state.force_at_start);
-        state.team_mode = mode::HYBRID;
+        state.team_mode = mode::CARRY;
     }
 
-    fn write_commands(&self, tick: u64, team_mode: u64, law: &HybridOutput, out: &mut CoordinatorOutputs) {
+    fn write_commands(
+        &self,
+        tick: u64,
+        state: &CoordinatorState,
+        law: &HybridOutput,
+        out: &mut CoordinatorOutputs,
+    ) {
         let mut references = law.hands.iter();
         for (command, &hands) in out.commands.iter_mut().zip(&self.hands_of_robots) {
-            *command = TeamCommand { team_mode, state_tick: tick, ..TeamCommand::zeroed() };
+            *command = TeamCommand {
+                team_mode: state.team_mode,
+                state_tick: tick,
+                step_clock: state.clock.clock,
+                closed_hands: (1 << hands.min(MAX_HANDS)) - 1,
+                ..TeamCommand::zeroed()
+            };
             for (hand, reference) in references.by_ref().take(hands.min(MAX_HANDS)).enumerate() {
                 command.hand_pose_ref[hand] = reference.pose.to_array();
                 command.hand_twist_ref[hand] = reference.twist.to_array();
+                command.hand_wrench_ref[hand] = reference.wrench.to_array();
             }
         }
     }
@@ -218,7 +251,7 @@ fn read_hands<'a>(
 }
 
 fn write_team_state(
-    team_mode: u64,
+    state: &CoordinatorState,
     law: &HybridOutput,
     reference: Option<(&GeneralizedForce, &GeneralizedPosition)>,
     out: &mut CoordinatorOutputs,
@@ -229,7 +262,9 @@ fn write_team_state(
     *team_state = TeamState {
         object_pose: measured.to_array(),
         object_pose_ref: object_pose_ref.to_array(),
-        team_mode,
+        object_twist_ref: state.motion.twist,
+        step_clock: state.clock.clock,
+        team_mode: state.team_mode,
         ..TeamState::zeroed()
     };
     write_force(&law.force, &mut team_state.generalized_force);

@@ -65,7 +65,7 @@ fn a_tick_allocates_nothing_and_nothing_survives_in_its_scratch() {
         );
     }
     assert_eq!(bytemuck::bytes_of(&state), bytemuck::bytes_of(&other_state));
-    assert_eq!(out.team_state.team_mode, mode::HYBRID);
+    assert_eq!(out.team_state.team_mode, mode::CARRY);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn control_starts_on_its_tick_and_without_a_jump() {
     let mut last = None;
     for tick in 0..40 {
         coordinator.tick(tick, &mut state, &mut scratch, robots(&run, 0).iter(), &mut out).expect("commands");
-        let expected = if tick < 10 { mode::HOLD } else { mode::HYBRID };
+        let expected = if tick < 10 { mode::HOLD } else { mode::CARRY };
         assert_eq!(out.team_state.team_mode, expected, "tick {tick}");
         let hands = out.commands.map(|command| command.hand_pose_ref);
         if let Some(last) = last.replace(hands) {

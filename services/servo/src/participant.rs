@@ -97,6 +97,7 @@ impl<T: Transport> Participant for ServoParticipant<T> {
 fn service_error(error: ServoError) -> TickError {
     TickError::Service(match error {
         ServoError::HandReference => "a hand reference is not a pose",
+        ServoError::StepClock => "the team's step clock is none",
         ServoError::InverseKinematics => "the inverse kinematics rejects its inputs",
     })
 }

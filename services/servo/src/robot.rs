@@ -3,6 +3,7 @@
 use core::ops::Deref;
 use mikoshi_config::RobotSpec;
 use mikoshi_humanoid::estimate::{BaseEstimator, BaseEstimatorGains};
+use mikoshi_humanoid::gait::SolvePreviewError;
 use mikoshi_humanoid::ik::ConfigureIkError;
 use mikoshi_humanoid::{Kinematics, WholeBodyIk};
 use mikoshi_robot::MatchRobotError;
@@ -25,6 +26,8 @@ pub enum BuildRobotError {
     Match(#[from] MatchRobotError),
     #[error("{0}")]
     Ik(#[from] ConfigureIkError),
+    #[error("gait: {0}")]
+    Gait(#[from] SolvePreviewError),
 }
 
 impl Robot {

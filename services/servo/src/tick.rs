@@ -1,18 +1,20 @@
 //! One robot's tick, in two halves: `sense` says where it is, `act` says where it goes. No allocation,
 //! no clock, no I/O, no panic path.
 
+use crate::legs::{Felt, HandReference, Legs, LegsState};
 use crate::robot::{BuildRobotError, Robot};
 use mikoshi_config::RunSpec;
-use mikoshi_humanoid::balance::{Pendulum, PerFoot, Side};
+use mikoshi_humanoid::balance::{ExternalLoad, PerFoot, Side};
 use mikoshi_humanoid::estimate::{
-    BaseEstimate, BaseEstimatorState, FootContact, Readings, SupportPolygon, zero_moment_point,
+    BaseEstimate, BaseEstimatorState, Readings, SupportPolygon, zero_moment_point,
 };
+use mikoshi_humanoid::gait::{StepClock, StepWish};
 use mikoshi_humanoid::{IkReport, IkScratch, IkState, IkTargets, Kinematics};
 use mikoshi_ipc_types::{
     JointCommand, MAX_HANDS, MAX_JOINTS, PoseWire, RobotState, Sensors, TeamCommand, flag, mode,
 };
-use mikoshi_spatial::{Base, Foot, Hand, Pose, Sensor, World, Wrench};
-use nalgebra::{UnitQuaternion, Vector3};
+use mikoshi_spatial::{Hand, Pose, Sensor, Twist, World, Wrench};
+use nalgebra::{Vector2, Vector3};
 
 /// Share of its weight below which a robot has no zero moment point to speak of.
 const LEAST_GROUND_FORCE: f64 = 0.1;
@@ -23,16 +25,8 @@ const HAND_TOLERANCE_M: f64 = 0.005;
 #[derive(Clone, Debug)]
 pub struct Servo {
     robot: Robot,
+    legs: Legs,
     initial: ServoState,
-    stance: Stance,
-}
-
-/// Where the robot stands, and how.
-#[derive(Clone, Copy, Debug)]
-struct Stance {
-    soles: PerFoot<Pose<World, Foot>>,
-    com: Vector3<f64>,
-    waist: UnitQuaternion<f64>,
 }
 
 /// All that matters between ticks.
@@ -40,6 +34,8 @@ struct Stance {
 pub struct ServoState {
     ik: IkState,
     base: BaseEstimatorState,
+    legs: LegsState,
+    felt: Felt,
     hand_pose_commanded: [PoseWire; MAX_HANDS],
     hand_error_max_m: f64,
     joint_margin_rad: f64,
@@ -59,6 +55,8 @@ pub struct ServoScratch {
 pub enum ServoError {
     #[error("a hand reference is not a pose")]
     HandReference,
+    #[error("the team's step clock is none")]
+    StepClock,
     #[error("the inverse kinematics rejects its inputs")]
     InverseKinematics,
 }
@@ -78,21 +76,25 @@ impl Servo {
         for (array, &palm) in hand_pose_commanded.iter_mut().zip(&robot.palms) {
             *array = kinematics.frame_pose::<Hand>(&robot.model, palm).to_array();
         }
-        let waist = robot.ik.config().waist;
-        let stance = Stance {
-            soles: PerFoot::from_fn(|side| kinematics.frame_pose(&robot.model, robot.soles[side])),
-            com: kinematics.com(),
-            waist: kinematics.frame_pose::<Base>(&robot.model, waist).rotation,
-        };
+        let (legs, legs_state) = Legs::new(run, index, &robot, &kinematics)?;
+        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(&robot.model, robot.soles[side]));
         let initial = ServoState {
             ik: IkState::at_rest(&spec.initial_posture_rad),
             base: robot.base_estimator.start(&robot.model, &X_WB, &spec.initial_posture_rad),
+            legs: legs_state,
+            felt: Felt {
+                com: kinematics.com().xy(),
+                com_velocity: Vector2::zeros(),
+                soles,
+                ground_wrench: PerFoot { right: Wrench::zero(), left: Wrench::zero() },
+                load: ExternalLoad::NONE,
+            },
             hand_pose_commanded,
             hand_error_max_m: 0.0,
             joint_margin_rad: mikoshi_humanoid::ik::joint_margin(&robot.model, &spec.initial_posture_rad),
             flags: 0,
         };
-        Ok(Self { robot, initial, stance })
+        Ok(Self { robot, legs, initial })
     }
 
     /// The state at tick 0.
@@ -105,7 +107,8 @@ impl Servo {
         ServoScratch { measured: self.robot.kinematics(), ik: IkScratch::new(&self.robot.model) }
     }
 
-    /// Where the robot is: base, hands, what the hands apply to the object, what the ground applies to it.
+    /// Where the robot is: base, hands, what the hands apply to the object, what the ground applies to it;
+    /// and what it wishes of the team's step clock.
     pub fn sense(
         &self,
         state: &mut ServoState,
@@ -113,28 +116,27 @@ impl Servo {
         sensors: &Sensors,
         out: &mut RobotState,
     ) {
-        let (robot, model) = (&self.robot, &self.robot.model);
         let kinematics = &mut scratch.measured;
-        let base = self.estimate_base(&mut state.base, kinematics, sensors);
+        let base = self.estimate_base(state, kinematics, sensors);
+        let load = self.sense_hands(kinematics, sensors, out);
+        state.felt = self.sense_balance(&state.legs, kinematics, &base, load, sensors, out);
 
-        for (hand, (&palm, sensor)) in robot.palms.iter().zip(&robot.wrist_sensors).enumerate() {
-            let X_WH: Pose<World, Hand> = kinematics.frame_pose(model, palm);
-            let reading = Wrench::<Sensor>::from_array(&sensors.wrist_wrench[hand]);
-            let on_object = sensor.applied_wrench(model, kinematics, &reading, None, &X_WH.translation);
-            out.hand_pose[hand] = X_WH.to_array();
-            out.hand_wrench[hand] = on_object.to_array();
-        }
-        self.sense_balance(kinematics, &base, sensors, out);
+        let wish = self.legs.wish(&state.legs);
+        let is_behind = state.flags & flag::HANDS_BEHIND != 0;
+        out.flags = state.flags | wish_flags(&StepWish { ready: wish.ready && !is_behind, ..wish });
+        out.step_urgency = wish.urgency;
+        out.speed_share = self.legs.speed_share(&state.legs);
+        out.steps = state.legs.steps;
         out.hand_pose_commanded = state.hand_pose_commanded;
         out.base_pose = base.pose.to_array();
         out.joint_margin_min_rad = state.joint_margin_rad;
         out.hand_error_max_m = state.hand_error_max_m;
-        out.flags = state.flags;
+        out.holding_hands = sensors.holding_hands;
     }
 
     fn estimate_base(
         &self,
-        state: &mut BaseEstimatorState,
+        state: &mut ServoState,
         kinematics: &mut Kinematics,
         sensors: &Sensors,
     ) -> BaseEstimate {
@@ -147,42 +149,65 @@ impl Servo {
             angular_velocity: Vector3::from(sensors.imu_angular_velocity_rad_s),
             specific_force: Vector3::from(sensors.imu_specific_force_m_s2),
         };
-        let feet = PerFoot::from_fn(|side| FootContact { pose: self.stance.soles[side], weight: 1.0 });
-        self.robot.base_estimator.update(&self.robot.model, state, kinematics, &readings, &feet)
+        let feet = self.legs.contacts(&state.legs);
+        self.robot.base_estimator.update(&self.robot.model, &mut state.base, kinematics, &readings, &feet)
+    }
+
+    /// Hands and what they apply to the object; what that does to the balance.
+    fn sense_hands(&self, kinematics: &Kinematics, sensors: &Sensors, out: &mut RobotState) -> ExternalLoad {
+        let (robot, model) = (&self.robot, &self.robot.model);
+        for (hand, (&palm, sensor)) in robot.palms.iter().zip(&robot.wrist_sensors).enumerate() {
+            let X_WH: Pose<World, Hand> = kinematics.frame_pose(model, palm);
+            let reading = Wrench::<Sensor>::from_array(&sensors.wrist_wrench[hand]);
+            let on_object = sensor.applied_wrench(model, kinematics, &reading, None, &X_WH.translation);
+            out.hand_pose[hand] = X_WH.to_array();
+            out.hand_wrench[hand] = on_object.to_array();
+        }
+        let hands = out.hand_pose.iter().zip(&out.hand_wrench).take(robot.palms.len());
+        let points = hands.map(|(pose, wrench)| {
+            (Vector3::new(pose[0], pose[1], pose[2]), Wrench::<World>::from_array(wrench))
+        });
+        ExternalLoad::of_hands(&self.legs.pendulum, 0.0, points)
     }
 
     /// Centre of mass, zero moment point and capture point, and how far they are from the edge.
     fn sense_balance(
         &self,
+        legs: &LegsState,
         kinematics: &Kinematics,
         base: &BaseEstimate,
+        load: ExternalLoad,
         sensors: &Sensors,
         out: &mut RobotState,
-    ) {
+    ) -> Felt {
         let (robot, model) = (&self.robot, &self.robot.model);
         let (joint_velocity, _) = sensors.joint_velocity_rad_s.split_at(model.joint_count().min(MAX_JOINTS));
         let com = kinematics.com();
-        let com_velocity = kinematics.com_velocity(model, &base.twist, joint_velocity);
-        let ground_z = self.stance.soles.right.translation.z;
-        let pendulum = Pendulum { mass_kg: model.total_mass_kg(), com_height_m: com.z - ground_z };
-        let capture_point = pendulum.divergent_component(&com.xy(), &com_velocity.xy());
+        let com_velocity = kinematics.com_velocity(model, &base.twist, joint_velocity).xy();
+        let capture_point = self.legs.pendulum.divergent_component(&com.xy(), &com_velocity);
 
-        let mut on_ground = Wrench::<World>::zero();
+        let standing = self.legs.standing(legs);
+        let contacts = self.legs.contacts(legs);
+        let mut ground_wrench = PerFoot { right: Wrench::zero(), left: Wrench::zero() };
+        let mut on_robot = Wrench::<World>::zero();
         for (side, reading) in Side::BOTH.into_iter().zip(&sensors.ankle_wrench) {
             let reading = Wrench::<Sensor>::from_array(reading);
-            let sensor = &robot.ankle_sensors[side];
-            on_ground += sensor.applied_wrench(model, kinematics, &reading, None, &Vector3::zeros());
+            let at = contacts[side].pose.translation;
+            let on_ground = robot.ankle_sensors[side].applied_wrench(model, kinematics, &reading, None, &at);
+            ground_wrench[side] = -on_ground;
+            on_robot += ground_wrench[side].shifted(&at);
         }
-        let least_force_n = LEAST_GROUND_FORCE * pendulum.weight_n();
+        let least_force_n = LEAST_GROUND_FORCE * self.legs.pendulum.weight_n();
         // Without a grip on the ground the margin is that of the capture point alone.
-        let zmp = zero_moment_point(&-on_ground, ground_z, least_force_n).unwrap_or(capture_point);
-        let standing = PerFoot::from_fn(|side| Some(self.stance.soles[side]));
+        let zmp = zero_moment_point(&on_robot, 0.0, least_force_n).unwrap_or(capture_point);
         let support = SupportPolygon::of_feet(&robot.sole_rectangles, &standing);
 
         out.com_position_m = com.into();
         out.zmp_position_m = zmp.into();
         out.zmp_margin_m = support.signed_distance(&zmp);
         out.capture_point_margin_m = support.signed_distance(&capture_point);
+        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(model, robot.soles[side]));
+        Felt { com: com.xy(), com_velocity, soles, ground_wrench, load }
     }
 
     /// Where the robot goes.
@@ -194,30 +219,49 @@ impl Servo {
         out: &mut JointCommand,
     ) -> Result<(), ServoError> {
         if let Some(command) = command.filter(|command| command.team_mode != mode::HOLD) {
-            let targets = self.targets(command)?;
+            // The state changes only when nothing can fail any more.
+            let (mut legs, mut ik) = (state.legs, state.ik);
+            let targets = self.targets(&mut legs, &state.felt, command)?;
             let report = self
                 .robot
                 .ik
-                .solve(&self.robot.model, &mut state.ik, &mut scratch.ik, &targets)
+                .solve(&self.robot.model, &mut ik, &mut scratch.ik, &targets)
                 .map_err(|_| ServoError::InverseKinematics)?;
+            (state.legs, state.ik) = (legs, ik);
             self.remember(state, &report);
         }
         out.joint_position_ref_rad = state.ik.joint_position;
         out.joint_velocity_ref_rad_s = state.ik.joint_velocity;
+        out.closed_hands = command.map_or(0, |command| command.closed_hands);
         out.team_command_tick = command.map_or(0, |command| command.state_tick);
         Ok(())
     }
 
-    fn targets(&self, command: &TeamCommand) -> Result<IkTargets, ServoError> {
+    fn targets(
+        &self,
+        legs: &mut LegsState,
+        felt: &Felt,
+        command: &TeamCommand,
+    ) -> Result<IkTargets, ServoError> {
+        let clock = StepClock::from_words(command.step_clock).ok_or(ServoError::StepClock)?;
+        let count = self.robot.palms.len().min(MAX_HANDS);
         let mut hands = [None; MAX_HANDS];
-        for (target, array) in hands.iter_mut().zip(&command.hand_pose_ref).take(self.robot.palms.len()) {
-            *target = Some(Pose::from_array(array).ok_or(ServoError::HandReference)?);
+        let mut references = [HandReference::default(); MAX_HANDS];
+        let poses = hands.iter_mut().zip(&mut references).zip(&command.hand_pose_ref);
+        let motions = command.hand_twist_ref.iter().zip(&command.hand_wrench_ref);
+        for (((target, reference), pose), (twist, wrench)) in poses.zip(motions).take(count) {
+            let pose = Pose::<World, Hand>::from_array(pose).ok_or(ServoError::HandReference)?;
+            *target = Some(pose);
+            let (twist, wrench) = (Twist::from_array(twist), Wrench::from_array(wrench));
+            *reference = HandReference { pose, twist, wrench };
         }
+        let grasping = references.get(..count).unwrap_or(&references);
+        let legs = self.legs.act(legs, clock, grasping, felt);
         Ok(IkTargets {
-            stance: Side::Right,
-            feet: self.stance.soles,
-            com: self.stance.com,
-            waist_attitude: self.stance.waist,
+            stance: legs.stance,
+            feet: legs.feet,
+            com: legs.com,
+            waist_attitude: legs.waist_attitude,
             hands,
         })
     }
@@ -228,11 +272,22 @@ impl Servo {
         }
         state.hand_error_max_m = report.hand_error_m.iter().copied().fold(0.0, f64::max);
         state.joint_margin_rad = report.joint_margin;
-        let set = |bit, is_set: bool| if is_set { bit } else { 0 };
         state.flags = set(flag::JOINT_LIMIT, report.at_position_limit != 0)
             | set(flag::VELOCITY_LIMIT, report.at_velocity_limit != 0)
             | set(flag::HANDS_BEHIND, state.hand_error_max_m > HAND_TOLERANCE_M);
     }
+}
+
+/// What the robot wishes, as its frame carries it.
+fn wish_flags(wish: &StepWish) -> u64 {
+    set(flag::WANTS_STEP, wish.wants_step)
+        | set(flag::CAN_STOP, wish.can_stop)
+        | set(flag::READY_TO_STEP, wish.ready)
+        | set(flag::LEFT_FIRST, wish.first_swing == Side::Left)
+}
+
+fn set(bit: u64, is_set: bool) -> u64 {
+    if is_set { bit } else { 0 }
 }
 
 impl ServoScratch {

@@ -32,7 +32,7 @@ fn sensors(run: &RunSpec, command: &JointCommand, tick: u64) -> Sensors {
 
 /// Hands to where the servo says they are, and a little on.
 fn follow(state: &RobotState) -> TeamCommand {
-    let mut command = TeamCommand { team_mode: mode::HYBRID, ..TeamCommand::zeroed() };
+    let mut command = TeamCommand { team_mode: mode::CARRY, ..TeamCommand::zeroed() };
     command.hand_pose_ref = state.hand_pose_commanded;
     command.hand_pose_ref[0][0] += 1e-4;
     command.hand_pose_ref[1][2] -= 5e-5;
@@ -90,7 +90,7 @@ fn a_reference_that_is_no_pose_is_refused_and_changes_nothing() {
     let (mut state, mut scratch) = (servo.initial_state(), servo.scratch());
     let before = state;
     let mut command = JointCommand::zeroed();
-    let bad = TeamCommand { team_mode: mode::HYBRID, ..TeamCommand::zeroed() };
+    let bad = TeamCommand { team_mode: mode::CARRY, ..TeamCommand::zeroed() };
     assert!(servo.act(&mut state, &mut scratch, Some(&bad), &mut command).is_err());
     assert_eq!(state, before);
 }

@@ -95,7 +95,7 @@ impl HybridLaw {
         let at_rest = Twist::zero();
         let Some(reference) = &inputs.reference else {
             for (out, pose) in references.iter_mut().zip(hand_pose_ref.iter()) {
-                *out = HandReference { pose: *pose, twist: at_rest };
+                *out = HandReference { pose: *pose, twist: at_rest, wrench: Wrench::zero() };
             }
             store(state, references);
             return Ok(());
@@ -119,10 +119,37 @@ impl HybridLaw {
             let wanted = pose.displaced(&(feedback + twist * self.parameters.period_s));
             let (pose, is_held_back) = self.within_lead(hand, wanted);
             *hands_held_back += usize::from(is_held_back);
-            *out = HandReference { pose, twist };
+            *out = HandReference { pose, twist, wrench: Wrench::zero() };
+        }
+        self.deal_out_forces(h_c, z_c, reference, workspace);
+        let tips = sticks.iter().zip(&workspace.tip_wrenches);
+        for ((out, hand), (stick, tip)) in references.iter_mut().zip(inputs.hands).zip(tips) {
+            out.wrench = stick.hand_wrench(&hand.pose, tip);
         }
         store(state, references);
         Ok(())
+    }
+
+    /// What each tip is to apply (eq. 7), in `workspace.tip_wrenches`: references on force axes; on position
+    /// axes, where the force is whatever holds the position, what is measured.
+    fn deal_out_forces(
+        &self,
+        h_c: &GeneralizedForce,
+        z_c: &GeneralizedPosition,
+        reference: &HybridReference,
+        workspace: &mut WorkspaceScratch,
+    ) {
+        let WorkspaceScratch { tip_wrenches, row_wrenches, work_wrenches, .. } = workspace;
+        let X_WA: &Pose<World, Object> = &z_c.external;
+        let mut rows = self.rows.iter().zip(row_wrenches.iter_mut());
+        if let Some((row, h)) = rows.next() {
+            *h = row.expected_force(&reference.force.external, &h_c.external);
+        }
+        let internal = reference.force.internal.iter().zip(&h_c.internal);
+        for ((row, h), (h_r, h_c)) in rows.zip(internal) {
+            *h = row.expected_force(h_r, h_c).expressed_in(X_WA);
+        }
+        self.internal_forces.tip_forces(row_wrenches, tip_wrenches, work_wrenches);
     }
 
     fn check<const CAPACITY: usize>(
@@ -266,6 +293,12 @@ impl RowLaw {
     /// S (h_r − h_c).
     fn force_error<F: CoordinateFrame>(&self, h_r: &Wrench<F>, h_c: &Wrench<F>) -> Wrench<F> {
         Wrench::from_vector(&self.is_force.component_mul(&(*h_r - *h_c).to_vector()))
+    }
+
+    /// S h_r + (I − S) h_c.
+    fn expected_force<F: CoordinateFrame>(&self, h_r: &Wrench<F>, h_c: &Wrench<F>) -> Wrench<F> {
+        let (h_r, h_c) = (h_r.to_vector(), h_c.to_vector());
+        Wrench::from_vector(&(self.is_force.component_mul(&h_r) + self.is_position.component_mul(&h_c)))
     }
 
     /// (I − S) of z_r^input − z_c.

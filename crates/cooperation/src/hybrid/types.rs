@@ -42,6 +42,9 @@ pub struct HandReference {
     /// Twist of the hand if it moves with the object's reference: the predictable part of the reference's
     /// motion. What feedback adds is not in it.
     pub twist: Twist<World>,
+    /// Wrench that the hand is to apply to the object, at its origin: its share of what moves the object
+    /// and of the reference internal forces (eq. 7). The predictable part of its load.
+    pub wrench: Wrench<World>,
 }
 
 /// What one tick gives.
@@ -60,7 +63,7 @@ pub struct HybridOutput {
 impl HybridOutput {
     /// For n `arms`.
     pub fn new(arms: usize) -> Self {
-        let at_rest = HandReference { pose: Pose::identity(), twist: Twist::zero() };
+        let at_rest = HandReference { pose: Pose::identity(), twist: Twist::zero(), wrench: Wrench::zero() };
         Self {
             force: GeneralizedForce::zero(arms),
             position: GeneralizedPosition::at_grasp(Pose::identity(), arms),

@@ -64,7 +64,7 @@ impl StabiliserConfig {
             dcm_gain: 2.0,
             dcm_integral_gain_1_s: 1.0,
             dcm_integral_max_m: 0.03,
-            leak_s: 1.0,
+            leak_s: 0.3,
             sole_margin_m: 0.01,
             ankle_rad_s_nm: 1e-3,
             ankle_max_rad: 0.15,

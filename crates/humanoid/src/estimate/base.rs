@@ -45,7 +45,7 @@ pub struct BaseEstimatorGains {
 
 impl Default for BaseEstimatorGains {
     fn default() -> Self {
-        Self { tilt_1_s: 1.0, yaw_1_s: 5.0, bias_1_s: 0.1, gravity_tolerance_m_s2: 1.0 }
+        Self { tilt_1_s: 0.3, yaw_1_s: 5.0, bias_1_s: 0.1, gravity_tolerance_m_s2: 1.0 }
     }
 }
 

@@ -2,7 +2,7 @@
 //! of the centre of mass.
 
 use super::foot_placement::{FootError, FootPlacement, HandCentre};
-use super::ground_pose::GroundPose;
+use super::ground_pose::{GroundPose, wrap};
 use super::machine::{GaitPhase, SwingingFoot, TransitionInputs};
 use super::preview::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError};
 use super::step_clock::{StepClock, StepTiming};
@@ -30,6 +30,11 @@ pub struct GaitConfig {
     pub start: FootError,
     /// Foot errors (eq. 40) below which it can stop.
     pub stop: FootError,
+    /// Distance of the body from where it belongs under the hands (eq. 40 for the middle of both feet)
+    /// from which on the object has to slow down.
+    pub slow: FootError,
+    /// Distance at which it has to stand.
+    pub halt: FootError,
     /// Where under each foot the zero moment point shall rest, in the foot's frame \[m\].
     pub zmp_in_foot: PerFoot<Vector2<f64>>,
     /// Whether the robot swings its right foot where the team's clock says left, so that robots that
@@ -54,6 +59,8 @@ impl GaitConfig {
             preview,
             start: FootError { position: 0.03, yaw: 0.05 },
             stop: FootError { position: 0.02, yaw: 0.03 },
+            slow: FootError { position: 0.08, yaw: 0.12 },
+            halt: FootError { position: 0.14, yaw: 0.20 },
             zmp_in_foot: PerFoot::from_fn(|side| {
                 Vector2::new((soles[side].x_min + soles[side].x_max) / 2.0, 0.0)
             }),
@@ -201,6 +208,21 @@ impl Gait {
         }
     }
 
+    /// The share of its speed that the object may keep without leaving the robot behind (Fig. 10b): 1 up
+    /// to the error `slow`, 0 from `halt` on.
+    pub fn speed_share(&self, state: &GaitState, hand_centre: Option<&HandCentre>) -> f64 {
+        let (Some(placement), Some(centre)) = (&state.placement, hand_centre) else { return 1.0 };
+        let (feet, reference) = (footholds(state), placement.reference_feet(&centre.pose));
+        let middle = |feet: &PerFoot<GroundPose>| GroundPose {
+            position: (feet.right.position + feet.left.position) / 2.0,
+            yaw: wrap(feet.right.yaw + wrap(feet.left.yaw - feet.right.yaw) / 2.0),
+        };
+        let error = FootError::between(&middle(&reference), &middle(&feet));
+        let GaitConfig { slow, halt, .. } = &self.config;
+        let share = |error: f64, slow: f64, halt: f64| ((halt - error) / (halt - slow)).clamp(0.0, 1.0);
+        share(error.position, slow.position, halt.position).min(share(error.yaw, slow.yaw, halt.yaw))
+    }
+
     /// One tick: the phase follows the clock, the step that is planned follows the hands, the centre of
     /// mass follows the zero moment point's reference. Returns the references at the end of the tick.
     pub fn act(&self, state: &mut GaitState, inputs: &GaitInputs) -> GaitReference {
@@ -218,7 +240,7 @@ impl Gait {
         let (duration, dt) = (self.seconds(timing.single_support), self.config.preview.control_period_s);
         let landed = state.phase.meet_ground(&self.config.swing, &inputs.foot_force, share, duration, dt);
         if let Some((side, foothold)) = landed {
-            state.feet[side] = foothold;
+            state.feet[side] = foothold.on_plane_within(self.config.swing.plane_tolerance_m);
         }
         self.plan_step(state, inputs);
         state.stance = stance(&state.phase).unwrap_or(state.stance);

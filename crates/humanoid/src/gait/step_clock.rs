@@ -34,6 +34,12 @@ impl StepTiming {
         }
     }
 
+    /// With other lengths of a step's two parts.
+    pub fn with_supports(self, control_period_s: f64, double_support_s: f64, single_support_s: f64) -> Self {
+        let ticks = |seconds: f64| (seconds / control_period_s).round().max(1.0) as u64;
+        Self { double_support: ticks(double_support_s), single_support: ticks(single_support_s), ..self }
+    }
+
     /// Ticks from a step's start to its lift-off.
     pub fn lift_off(&self, step_index: u64) -> u64 {
         if step_index == 0 { self.lead + self.first_shift } else { self.double_support }

@@ -19,6 +19,11 @@ impl Foothold {
         Self { pose, height: 0.0 }
     }
 
+    /// On the plane if it is within `tolerance` of it.
+    pub fn on_plane_within(self, tolerance: f64) -> Self {
+        if self.height.abs() <= tolerance { Self::on_ground(self.pose) } else { self }
+    }
+
     /// As a pose in the world.
     pub fn in_world(&self) -> Pose<World, Foot> {
         self.pose.at_height(self.height)
@@ -30,10 +35,15 @@ impl Foothold {
 pub struct SwingConfig {
     /// Height of the arc over the ground plane \[m\].
     pub lift_m: f64,
+    /// Height over the plane at which a swing ends \[m\]: from there the foot is lowered slowly until it
+    /// feels the ground, which the stance foot has pressed in.
+    pub touchdown_m: f64,
     /// Vertical force from which on a foot counts as landed \[N\].
     pub contact_force_n: f64,
     /// Ticks in a row with that force: one noisy sample is no ground.
     pub contact_ticks: u64,
+    /// Ground within this of the plane is the plane: what differs is how the legs yield \[m\].
+    pub plane_tolerance_m: f64,
     /// Share of the swing before which force is no landing.
     pub contact_from: f64,
     /// Speed at which a foot that has found no ground is lowered further \[m/s\].
@@ -46,10 +56,12 @@ impl Default for SwingConfig {
     fn default() -> Self {
         Self {
             lift_m: 0.05,
+            touchdown_m: 0.001,
             contact_force_n: 30.0,
             contact_ticks: 2,
+            plane_tolerance_m: 0.006,
             contact_from: 0.7,
-            lowering_m_s: 0.05,
+            lowering_m_s: 0.02,
             lowering_max_m: 0.02,
         }
     }
@@ -104,8 +116,6 @@ pub enum SwingContact {
     Lowering {
         /// Where it is now.
         at: Foothold,
-        /// Ticks in a row with force.
-        force_ticks: u64,
     },
 }
 
@@ -126,6 +136,11 @@ impl Swing {
         Self { from, to, contact: SwingContact::Swinging { force_ticks: 0 } }
     }
 
+    /// Where the swing ends, over its foothold.
+    fn end(&self, config: &SwingConfig) -> Foothold {
+        Foothold { height: self.to.height + config.touchdown_m, ..self.to }
+    }
+
     /// The contact after a tick that ends at share `s` of the swing (1 and more: its time is over), with
     /// vertical force `force` on the foot \[N\].
     pub fn contact_after(
@@ -143,30 +158,30 @@ impl Swing {
                 let force_ticks = if s >= config.contact_from { count(force_ticks) } else { 0 };
                 // Where the foot was while it felt the ground, not where this tick would take it.
                 let at = |s: f64| {
-                    let (pose, _) = swing_foot(&self.from, &self.to, config.lift_m, s, duration);
+                    let (pose, _) = swing_foot(&self.from, &self.end(config), config.lift_m, s, duration);
                     Foothold { pose: GroundPose::of(&pose), height: pose.translation.z }
                 };
                 if force_ticks >= config.contact_ticks {
                     SwingContact::Landed { at: at(s - dt / duration) }
                 } else if s > 1.0 {
-                    SwingContact::Lowering { at: self.to, force_ticks }
+                    SwingContact::Lowering { at: self.end(config) }
                 } else {
                     SwingContact::Swinging { force_ticks }
                 }
             }
-            SwingContact::Landed { at } if force >= 0.5 * config.contact_force_n => {
+            // On the plane a foot has come to stay, even if the other one still bears all.
+            SwingContact::Landed { at }
+                if force >= 0.5 * config.contact_force_n || at.height.abs() <= config.plane_tolerance_m =>
+            {
                 SwingContact::Landed { at }
             }
-            SwingContact::Landed { at } => SwingContact::Lowering { at, force_ticks: 0 },
-            SwingContact::Lowering { at, force_ticks } => {
-                let force_ticks = count(force_ticks);
-                if force_ticks >= config.contact_ticks {
-                    return SwingContact::Landed { at };
-                }
+            SwingContact::Landed { at } => SwingContact::Lowering { at },
+            // A foot that is waiting for the ground has found it: what is lowered slowly hardly bounces.
+            SwingContact::Lowering { at } if touches => SwingContact::Landed { at },
+            SwingContact::Lowering { at } => {
                 let lowest = (-config.lowering_max_m).min(at.height);
-                let height =
-                    if touches { at.height } else { (at.height - config.lowering_m_s * dt).max(lowest) };
-                SwingContact::Lowering { at: Foothold { height, ..at }, force_ticks }
+                let height = (at.height - config.lowering_m_s * dt).max(lowest);
+                SwingContact::Lowering { at: Foothold { height, ..at } }
             }
         }
     }
@@ -174,11 +189,12 @@ impl Swing {
     /// Pose and velocity at share `s` of the swing.
     pub fn foot(&self, config: &SwingConfig, s: f64, duration: f64) -> (Pose<World, Foot>, Twist<World>) {
         match self.contact {
-            SwingContact::Swinging { .. } => swing_foot(&self.from, &self.to, config.lift_m, s, duration),
+            SwingContact::Swinging { .. } => {
+                swing_foot(&self.from, &self.end(config), config.lift_m, s, duration)
+            }
             SwingContact::Landed { at } => (at.in_world(), Twist::zero()),
-            SwingContact::Lowering { at, force_ticks } => {
-                let lowers = force_ticks == 0 && at.height > -config.lowering_max_m;
-                let speed = if lowers { -config.lowering_m_s } else { 0.0 };
+            SwingContact::Lowering { at } => {
+                let speed = if at.height > -config.lowering_max_m { -config.lowering_m_s } else { 0.0 };
                 (at.in_world(), Twist::new(Vector3::new(0.0, 0.0, speed), Vector3::zeros()))
             }
         }

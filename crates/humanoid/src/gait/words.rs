@@ -125,7 +125,7 @@ impl Writer {
         let (kind, at, ticks) = match swing.contact {
             SwingContact::Swinging { force_ticks } => (0, None, force_ticks),
             SwingContact::Landed { at } => (1, Some(at), 0),
-            SwingContact::Lowering { at, force_ticks } => (2, Some(at), force_ticks),
+            SwingContact::Lowering { at } => (2, Some(at), 0),
         };
         self.word(kind);
         self.foothold(&at.unwrap_or_default());
@@ -191,7 +191,7 @@ impl Reader<'_> {
         let contact = match (self.word()?, self.foothold()?, self.word()?) {
             (0, _, force_ticks) => SwingContact::Swinging { force_ticks },
             (1, at, _) => SwingContact::Landed { at },
-            (2, at, force_ticks) => SwingContact::Lowering { at, force_ticks },
+            (2, at, _) => SwingContact::Lowering { at },
             _ => return None,
         };
         let foot = SwingingFoot { side, swing: Swing { from, to, contact } };

@@ -1,0 +1,160 @@
+//! The object's reference motion: the operator's velocities, bounded by what the slowest robot can follow
+//! (Fig. 10b) and by accelerations, and their integral.
+
+use bytemuck::{Pod, Zeroable};
+use mikoshi_config::RunSpec;
+use mikoshi_config::scenario::Segment;
+use mikoshi_spatial::{Object, Pose, Twist, World};
+use nalgebra::Vector3;
+
+/// The operator's velocities over time.
+#[derive(Clone, Debug)]
+pub(crate) struct ObjectMotion {
+    segments: Vec<Segment>,
+    period_s: f64,
+    /// Largest change of velocity in a tick \[m/s\].
+    step_m_s: f64,
+    /// The same of angular velocity \[rad/s\].
+    step_rad_s: f64,
+}
+
+/// Where the reference is, and how fast.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ObjectMotionState {
+    /// Reference pose.
+    pub pose: [f64; 7],
+    /// Reference twist in the world, of the object's origin.
+    pub twist: [f64; 6],
+    /// How far along the operator's velocities the object is: it stands still when the team can't follow.
+    pub path_time_s: f64,
+}
+
+// SAFETY: zeros are a valid value of floats.
+unsafe impl Zeroable for ObjectMotionState {}
+// SAFETY: `repr(C)` over floats only: no padding, any bit pattern valid.
+unsafe impl Pod for ObjectMotionState {}
+
+impl ObjectMotionState {
+    /// At rest.
+    pub(crate) fn at_rest(X_WA: &Pose<World, Object>) -> Self {
+        Self { pose: X_WA.to_array(), twist: [0.0; 6], path_time_s: 0.0 }
+    }
+
+    /// Reference twist.
+    pub(crate) fn twist(&self) -> Twist<World> {
+        Twist::from_array(&self.twist)
+    }
+}
+
+impl ObjectMotion {
+    /// Of this run.
+    pub(crate) fn new(run: &RunSpec) -> Self {
+        let period_s = run.scenario.control_period_s;
+        let accelerations = run.scenario.motion.as_ref();
+        let step =
+            |of: fn(&mikoshi_config::scenario::Motion) -> f64| accelerations.map_or(0.0, of) * period_s;
+        Self {
+            segments: run.motion.clone(),
+            period_s,
+            step_m_s: step(|motion| motion.acceleration_m_s2),
+            step_rad_s: step(|motion| motion.angular_acceleration_rad_s2),
+        }
+    }
+
+    /// One tick: the twist goes towards `speed_share` of the operator's, and the pose with it. Returns
+    /// the reference pose at the end of the tick; `None` if the state is no pose.
+    pub(crate) fn advance(
+        &self,
+        state: &mut ObjectMotionState,
+        speed_share: f64,
+    ) -> Option<Pose<World, Object>> {
+        let X_WA = Pose::<World, Object>::from_array(&state.pose)?;
+        let wanted = self.velocity_at(state.path_time_s);
+        let last = state.twist();
+        let twist = Twist::new(
+            towards(&last.linear, &(wanted.linear * speed_share), self.step_m_s),
+            towards(&last.angular, &(wanted.angular * speed_share), self.step_rad_s),
+        );
+        let X_WA = X_WA.displaced(&(twist * self.period_s));
+        *state = ObjectMotionState {
+            pose: X_WA.to_array(),
+            twist: twist.to_array(),
+            path_time_s: state.path_time_s + self.period_s * speed_share,
+        };
+        Some(X_WA)
+    }
+
+    /// Whether the operator asks for nothing more, and the object rests.
+    pub(crate) fn is_over(&self, state: &ObjectMotionState) -> bool {
+        let end_s: f64 = self.segments.iter().map(|segment| segment.duration_s).sum();
+        state.path_time_s >= end_s && state.twist == [0.0; 6]
+    }
+
+    fn velocity_at(&self, mut time_s: f64) -> Twist<World> {
+        for segment in &self.segments {
+            if time_s < segment.duration_s {
+                return Twist::new(segment.velocity_m_s.into(), segment.angular_velocity_rad_s.into());
+            }
+            time_s -= segment.duration_s;
+        }
+        Twist::zero()
+    }
+}
+
+/// `target`, or as far towards it as one step goes.
+fn towards(from: &Vector3<f64>, target: &Vector3<f64>, step: f64) -> Vector3<f64> {
+    let way = target - from;
+    let length = way.norm();
+    if length > step { from + way * (step / length) } else { *target }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOTION_STEP: f64 = 0.05 * 0.005;
+
+    fn motion() -> ObjectMotion {
+        let segment =
+            |velocity_m_s| Segment { duration_s: 2.0, velocity_m_s, angular_velocity_rad_s: [0.0; 3] };
+        ObjectMotion {
+            segments: vec![segment([0.1, 0.0, 0.0]), segment([0.0, -0.05, 0.0])],
+            period_s: 0.005,
+            step_m_s: MOTION_STEP,
+            step_rad_s: MOTION_STEP,
+        }
+    }
+
+    fn run(speed_share: f64, ticks: usize) -> ObjectMotionState {
+        let (motion, mut state) = (motion(), ObjectMotionState::at_rest(&Pose::identity()));
+        for _ in 0..ticks {
+            let last = state.twist();
+            motion.advance(&mut state, speed_share).expect("a pose");
+            assert!((state.twist().linear - last.linear).norm() <= MOTION_STEP * (1.0 + 1e-9));
+        }
+        state
+    }
+
+    #[test]
+    fn the_object_goes_where_its_velocities_lead_and_rests() {
+        let state = run(1.0, 2000);
+        assert!(motion().is_over(&state));
+        // Each change takes time and gains what the next one loses, but for the last one's direction.
+        assert!((state.pose[0] - 0.2).abs() < 0.02 && (state.pose[1] + 0.1).abs() < 0.02, "{:?}", state.pose);
+    }
+
+    #[test]
+    fn a_team_that_is_half_as_fast_goes_the_same_way_in_twice_the_time() {
+        let halfway = run(0.5, 400);
+        assert!((halfway.path_time_s - 1.0).abs() < 1e-9);
+        assert!((halfway.twist[0] - 0.05).abs() < 1e-12);
+        assert!(!motion().is_over(&run(0.5, 800)) && motion().is_over(&run(0.5, 2000)));
+    }
+
+    #[test]
+    fn a_team_that_can_not_follow_stands() {
+        let state = run(0.0, 400);
+        assert_eq!(state, ObjectMotionState::at_rest(&Pose::identity()));
+    }
+}

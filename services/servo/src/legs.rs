@@ -1,0 +1,298 @@
+//! What the legs do in a tick: gait and stabiliser of one robot, and which feet it may trust.
+
+use crate::robot::{BuildRobotError, Robot};
+use mikoshi_config::RunSpec;
+use mikoshi_humanoid::Kinematics;
+use mikoshi_humanoid::balance::{
+    ExternalLoad, Pendulum, PerFoot, Side, Stabiliser, StabiliserConfig, StabiliserInputs, StabiliserState,
+};
+use mikoshi_humanoid::estimate::FootContact;
+use mikoshi_humanoid::gait::{
+    FootPlacement, Gait, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose, HandCentre,
+    PreviewConfig, SoleCorrection, SoleTracking, StepClock, StepTiming, StepWish, SwingConfig, wrap,
+};
+use mikoshi_ipc_types::MAX_HANDS;
+use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, Wrench};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
+
+/// Gait and stabiliser of one robot. Immutable.
+#[derive(Clone, Debug)]
+pub(crate) struct Legs {
+    gait: Gait,
+    /// Absent where the scenario turns it off.
+    stabiliser: Option<Stabiliser>,
+    sole_tracking: SoleTracking,
+    /// The robot as an inverted pendulum.
+    pub pendulum: Pendulum,
+    period_s: f64,
+    /// Attitude of the waist over feet with heading 0.
+    waist_over_feet: UnitQuaternion<f64>,
+}
+
+/// All of it that matters between ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LegsState {
+    gait: GaitState,
+    stabiliser: StabiliserState,
+    sole_correction: SoleCorrection,
+    /// How much of the base's estimate rests on each foot, 0 to 1.
+    trust: PerFoot<f64>,
+    /// Of the hands' references in the last command.
+    hand_centre: Option<HandCentre>,
+    /// Steps taken.
+    pub steps: u64,
+}
+
+/// What a robot feels in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Felt {
+    /// Centre of mass \[m, world\].
+    pub com: Vector2<f64>,
+    /// Its velocity \[m/s\].
+    pub com_velocity: Vector2<f64>,
+    /// Soles.
+    pub soles: PerFoot<Pose<World, Foot>>,
+    /// Wrench of the ground on each foot, at the foot's origin.
+    pub ground_wrench: PerFoot<Wrench<World>>,
+    /// What the hands carry.
+    pub load: ExternalLoad,
+}
+
+/// What the team asks of a hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct HandReference {
+    pub pose: Pose<World, Hand>,
+    pub twist: Twist<World>,
+    /// That the hand is expected to apply to the object, at its origin.
+    pub wrench: Wrench<World>,
+}
+
+impl Default for HandReference {
+    fn default() -> Self {
+        Self { pose: Pose::identity(), twist: Twist::zero(), wrench: Wrench::zero() }
+    }
+}
+
+/// What the legs ask of the inverse kinematics.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LegTargets {
+    /// The foot that is the base.
+    pub stance: Side,
+    /// Soles.
+    pub feet: PerFoot<Pose<World, Foot>>,
+    /// Centre of mass \[m\].
+    pub com: Vector3<f64>,
+    /// Attitude of the waist.
+    pub waist_attitude: UnitQuaternion<f64>,
+}
+
+impl Legs {
+    /// Of robot `index` of this run, which stands as `kinematics` says; and their state at tick 0.
+    pub(crate) fn new(
+        run: &RunSpec,
+        index: usize,
+        robot: &Robot,
+        kinematics: &Kinematics,
+    ) -> Result<(Self, LegsState), BuildRobotError> {
+        let scenario = &run.scenario;
+        let period_s = scenario.control_period_s;
+        let soles = robot.soles;
+        let feet = PerFoot::from_fn(|side| kinematics.frame_pose::<Foot>(&robot.model, soles[side]));
+        let com = kinematics.com();
+        let com_height_m = com.z - (feet.right.translation.z + feet.left.translation.z) / 2.0;
+        let pendulum = Pendulum { mass_kg: robot.model.total_mass_kg(), com_height_m };
+        let standard = GaitConfig::standard(robot.sole_rectangles);
+        let config = GaitConfig {
+            timing: StepTiming::standard(period_s).with_supports(
+                period_s,
+                scenario.gait.double_support_s,
+                scenario.gait.single_support_s,
+            ),
+            swing: SwingConfig { lift_m: scenario.gait.lift_m, ..SwingConfig::default() },
+            preview: PreviewConfig { control_period_s: period_s, com_height_m, ..PreviewConfig::default() },
+            mirrored: scenario.gait.mirror_opposed && faces_back(run, index),
+            ..standard
+        };
+        let stabiliser =
+            StabiliserConfig::standard(period_s, pendulum, robot.sole_rectangles, config.zmp_in_foot);
+        let gait = Gait::new(config)?;
+        let on_ground = PerFoot::from_fn(|side| GroundPose::of(&feet[side]));
+        let waist: Pose<World, Base> = kinematics.frame_pose(&robot.model, robot.waist);
+        let state = LegsState {
+            gait: gait.standing(on_ground, com.xy()),
+            stabiliser: StabiliserState::default(),
+            sole_correction: PerFoot { right: Twist::zero(), left: Twist::zero() },
+            trust: PerFoot { right: 1.0, left: 1.0 },
+            hand_centre: None,
+            steps: 0,
+        };
+        let legs = Self {
+            gait,
+            stabiliser: scenario.balance.stabiliser.then(|| Stabiliser::new(stabiliser)),
+            sole_tracking: SoleTracking::default(),
+            pendulum,
+            period_s,
+            waist_over_feet: yawed(-mean_yaw(&on_ground)) * waist.rotation,
+        };
+        Ok((legs, state))
+    }
+
+    /// Which feet say where the base is: those that stand, by the phase of the gait and not by force,
+    /// since at touch-down a foot bears before it has come to rest; and gradually, so that feet which
+    /// disagree don't make the base jump.
+    pub(crate) fn contacts(&self, state: &LegsState) -> PerFoot<FootContact> {
+        PerFoot::from_fn(|side| FootContact {
+            pose: state.gait.feet[side].in_world(),
+            weight: state.trust[side],
+        })
+    }
+
+    /// Where each foot stands; `None` in the air.
+    pub(crate) fn standing(&self, state: &LegsState) -> PerFoot<Option<Pose<World, Foot>>> {
+        let reference = self.gait.reference(&state.gait);
+        PerFoot::from_fn(|side| {
+            let foot = &reference.feet[side];
+            foot.in_contact.then_some(foot.pose)
+        })
+    }
+
+    /// What the robot tells the team about its feet.
+    pub(crate) fn wish(&self, state: &LegsState) -> StepWish {
+        self.gait.wish(&state.gait, state.hand_centre.as_ref())
+    }
+
+    /// How much of its speed the object may keep.
+    pub(crate) fn speed_share(&self, state: &LegsState) -> f64 {
+        self.gait.speed_share(&state.gait, state.hand_centre.as_ref())
+    }
+
+    /// One tick: the feet follow the team's clock and the hands' references, the centre of mass the feet,
+    /// and the soles what is felt.
+    pub(crate) fn act(
+        &self,
+        state: &mut LegsState,
+        clock: StepClock,
+        hands: &[HandReference],
+        felt: &Felt,
+    ) -> LegTargets {
+        self.place_feet(state, hands);
+        // The centre of mass is planned for what the hands will carry. What they feel beside it is for the
+        // stabiliser: internal forces come and go, and a plan that followed them would stir them up.
+        let expected = hands.iter().map(|hand| (hand.pose.translation, hand.wrench));
+        let load = ExternalLoad::of_hands(&self.pendulum, 0.0, expected);
+        let now = self.gait.reference(&state.gait);
+        let stabilisation = self.stabiliser.as_ref().map(|stabiliser| {
+            let inputs = stabiliser_inputs(&now, felt);
+            stabiliser.act(&mut state.stabiliser, &inputs)
+        });
+        let was_swinging = is_swinging(&state.gait);
+        let next = self.gait.act(
+            &mut state.gait,
+            &GaitInputs {
+                clock,
+                hand_centre: state.hand_centre,
+                foot_force: PerFoot::from_fn(|side| felt.ground_wrench[side].force.z),
+                load,
+            },
+        );
+        state.steps += u64::from(is_swinging(&state.gait) && !was_swinging);
+        self.shift_trust(state);
+        self.correct_soles(state, &now, &next, felt);
+
+        let feet = PerFoot::from_fn(|side| {
+            let pose = next.feet[side].pose.displaced(&state.sole_correction[side]);
+            stabilisation.map_or(pose, |stabilisation| stabilisation.apply(side, &pose))
+        });
+        let com_offset = stabilisation.map_or_else(Vector2::zeros, |stabilisation| stabilisation.com_offset);
+        let on_ground = PerFoot::from_fn(|side| GroundPose::of(&next.feet[side].pose));
+        LegTargets {
+            stance: next.stance,
+            feet,
+            com: next.com + com_offset.push(0.0),
+            waist_attitude: yawed(mean_yaw(&on_ground)) * self.waist_over_feet,
+        }
+    }
+
+    /// Where the feet belong under the hands is recorded when the hands first have references.
+    fn place_feet(&self, state: &mut LegsState, hands: &[HandReference]) {
+        let mut poses = [Pose::identity(); MAX_HANDS];
+        let mut motions = [(Pose::identity(), Twist::zero()); MAX_HANDS];
+        for ((pose, motion), hand) in poses.iter_mut().zip(&mut motions).zip(hands) {
+            *pose = hand.pose;
+            *motion = (hand.pose, hand.twist);
+        }
+        if state.gait.placement.is_none() {
+            let feet = PerFoot::from_fn(|side| state.gait.feet[side].pose);
+            let grasping = poses.get(..hands.len()).unwrap_or(&poses);
+            state.gait.placement = FootPlacement::record(grasping, &feet);
+        }
+        let moving = motions.get(..hands.len()).unwrap_or(&motions);
+        state.hand_centre = state.gait.placement.and_then(|placement| placement.centre(moving));
+    }
+
+    /// What has sagged is lifted, and what has come to stand loses its correction; a foothold that is moved
+    /// to where it belongs gains one, so that the sole stays where it is.
+    fn correct_soles(&self, state: &mut LegsState, now: &GaitReference, next: &GaitReference, felt: &Felt) {
+        for side in Side::BOTH {
+            let (was, is) = (&now.feet[side], &next.feet[side]);
+            let correction = &mut state.sole_correction[side];
+            if !is.in_contact {
+                self.sole_tracking.follow(correction, &was.pose, &felt.soles[side], self.period_s);
+            } else {
+                *correction += is.pose.displacement_to(&was.pose);
+                self.sole_tracking.fade(correction, self.period_s);
+            }
+        }
+    }
+
+    fn shift_trust(&self, state: &mut LegsState) {
+        let stands = |side: Side| match state.gait.phase {
+            GaitPhase::Standing { .. } => true,
+            GaitPhase::Finishing { landing, .. } => landing.is_none_or(|foot| foot.side != side),
+            _ => side == state.gait.stance,
+        };
+        let most = self.period_s / self.seconds_of_double_support();
+        let is_up =
+            PerFoot::from_fn(|side| state.gait.phase.swinging_foot().is_some_and(|foot| foot.side == side));
+        for side in Side::BOTH {
+            let target = if stands(side) { 1.0 } else { 0.0 };
+            let trust = &mut state.trust[side];
+            *trust = if is_up[side] { 0.0 } else { *trust + (target - *trust).clamp(-most, most) };
+        }
+    }
+
+    fn seconds_of_double_support(&self) -> f64 {
+        self.gait.config().timing.double_support as f64 * self.period_s
+    }
+}
+
+fn stabiliser_inputs(now: &GaitReference, felt: &Felt) -> StabiliserInputs {
+    StabiliserInputs {
+        com_ref: now.com.xy(),
+        com_velocity_ref: now.com_velocity.xy(),
+        com_acceleration_ref: now.com_acceleration.xy(),
+        com: felt.com,
+        com_velocity: felt.com_velocity,
+        standing: PerFoot::from_fn(|side| now.feet[side].in_contact.then_some(now.feet[side].pose)),
+        ground_wrench: felt.ground_wrench,
+        load: felt.load,
+    }
+}
+
+fn is_swinging(gait: &GaitState) -> bool {
+    matches!(gait.phase, GaitPhase::SingleSupport { .. })
+}
+
+/// Whether a robot looks against the first one.
+fn faces_back(run: &RunSpec, index: usize) -> bool {
+    let yaw = |index: usize| run.robots.get(index).map_or(0.0, |robot| robot.member.yaw_deg.to_radians());
+    (yaw(index) - yaw(0)).cos() < -1e-9
+}
+
+fn mean_yaw(feet: &PerFoot<GroundPose>) -> f64 {
+    feet.right.yaw + wrap(feet.left.yaw - feet.right.yaw) / 2.0
+}
+
+fn yawed(yaw: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw)
+}
