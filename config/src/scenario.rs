@@ -200,6 +200,10 @@ pub struct AxisControl {
     /// Its reference: N, Nm, m or rad. Positions are relative to the grasp.
     #[serde(default)]
     pub reference: f64,
+    /// What an axis that is controlled by position is to bear in the end, N or Nm: nothing controls it, and
+    /// `thresholds.axis_reference_error_end_n` judges it.
+    #[serde(default)]
+    pub expected_force: Option<f64>,
 }
 
 /// An axis of a 6-vector.
@@ -268,6 +272,10 @@ pub struct Thresholds {
     pub internal_after_3s_nm: Option<f64>,
     pub internal_end_n: Option<f64>,
     pub internal_end_nm: Option<f64>,
+    /// Of every axis in `hybrid.axes` whose force is known beforehand: how far its true mean over the last
+    /// 0.2 s may be from its reference.
+    pub axis_reference_error_end_n: Option<f64>,
+    pub axis_reference_error_end_nm: Option<f64>,
     pub internal_peak_n: Option<f64>,
     pub object_position_rms_m: Option<f64>,
     pub object_position_peak_m: Option<f64>,

@@ -111,7 +111,7 @@ fn unknown_keys_are_rejected_everywhere() {
         SCENARIO,
         "axis = ",
         "direction = ",
-        "scenarios/lift.toml:21: hybrid.axes.0.direction: unknown key, expected one of row, axis, control, reference",
+        "scenarios/lift.toml:21: hybrid.axes.0.direction: unknown key, expected one of row, axis, control, reference, expected_force",
     );
     file_gives(
         TEAM,
@@ -199,7 +199,7 @@ fn wrong_types_say_what_was_found() {
         SCENARIO,
         "[physics]\nstep_s = 0.001\nfriction = 0.8",
         "physics = 1",
-        "scenarios/lift.toml:25: hybrid.axes.0.physics: unknown key, expected one of row, axis, control, reference",
+        "scenarios/lift.toml:25: hybrid.axes.0.physics: unknown key, expected one of row, axis, control, reference, expected_force",
     );
     file_gives(
         SCENARIO,
@@ -336,6 +336,8 @@ fn quantities_lie_in_their_ranges() {
         ("coordination_delay_ticks", "17", "at most 16 ticks"),
         ("sensors.delay_ticks", "1001", "at most 1000 ticks"),
         ("thresholds.foot_slip_max_m", "-1", "a finite number from 0"),
+        ("thresholds.axis_reference_error_end_n", "-1", "a finite number from 0"),
+        ("hybrid.axes.0.expected_force", "5", "none: an axis that is controlled by force has its reference"),
         ("placement.fifo_priority", "0", "a priority from 1 to 99"),
     ] {
         options_give(

@@ -2,7 +2,7 @@
 
 use super::checks::{Checks, Violation};
 use crate::robot::RobotConfig;
-use crate::scenario::{Grasp, InternalForces, Member, Motion, Scenario};
+use crate::scenario::{Control, Grasp, InternalForces, Member, Motion, Scenario};
 use mikoshi_ipc_types::MAX_ROBOTS;
 use std::collections::BTreeSet;
 
@@ -168,6 +168,12 @@ fn hybrid(checks: &mut Checks, scenario: &Scenario, arms: Option<usize>) {
     let mut seen = BTreeSet::new();
     for (index, axis) in hybrid.axes.iter().enumerate() {
         checks.finite(format_args!("hybrid.axes.{index}.reference"), axis.reference);
+        if let Some(force) = axis.expected_force {
+            let key = format!("hybrid.axes.{index}.expected_force");
+            checks.finite(&key, force);
+            let expected = "none: an axis that is controlled by force has its reference";
+            checks.require(axis.control == Control::Position, &key, force, expected);
+        }
         let found = format!("row {:?}, axis {:?} again", axis.row, axis.axis).to_lowercase();
         let is_new = seen.insert((&axis.row, axis.axis as u8));
         checks.require(is_new, format_args!("hybrid.axes.{index}"), found, "each axis of a row once");
@@ -215,6 +221,8 @@ fn thresholds(checks: &mut Checks, scenario: &Scenario) {
         ("internal_after_3s_nm", limits.internal_after_3s_nm),
         ("internal_end_n", limits.internal_end_n),
         ("internal_end_nm", limits.internal_end_nm),
+        ("axis_reference_error_end_n", limits.axis_reference_error_end_n),
+        ("axis_reference_error_end_nm", limits.axis_reference_error_end_nm),
         ("internal_peak_n", limits.internal_peak_n),
         ("object_position_rms_m", limits.object_position_rms_m),
         ("object_position_peak_m", limits.object_position_peak_m),

@@ -1,6 +1,7 @@
 //! Whether a run met its scenario's thresholds.
 
 use mikoshi_config::Scenario;
+use mikoshi_config::scenario::{AxisControl, Control, Thresholds};
 use mikoshi_observation::{InternalSummary, RobotSummary, Summary};
 
 /// How long after its start the hybrid law is judged.
@@ -26,6 +27,9 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
         }
     }
     let rows = summary.internal.as_slice();
+    for axis in &scenario.hybrid.axes {
+        judge_axis(&mut judge, limits, axis, rows);
+    }
     let (when, observed) =
         ("3 s after the start", is_judged_after_3s(scenario, summary.sim_time_s).then_some(rows));
     judge.internal_forces(observed, when, "N", limits.internal_after_3s_n, |row| row.after_3s_n);
@@ -44,6 +48,31 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
         judge_robot(&mut judge, scenario, robot);
     }
     judge.failures
+}
+
+/// One axis that departs from the default, if what it is to bear is known.
+fn judge_axis(judge: &mut Judge, limits: &Thresholds, axis: &AxisControl, rows: &[InternalSummary]) {
+    let reference = match axis.control {
+        Control::Force => Some(axis.reference),
+        Control::Position => axis.expected_force,
+    };
+    let component = axis.axis as usize;
+    let (limit, unit) = match component {
+        0..3 => (limits.axis_reference_error_end_n, "N"),
+        _ => (limits.axis_reference_error_end_nm, "Nm"),
+    };
+    let (Some(reference), Some(limit)) = (reference, limit) else { return };
+    // The external force has no figure: NaN fails.
+    let row = rows.iter().find(|row| row.name == axis.row);
+    let end = row.map_or(f64::NAN, |row| row.end_mean[component]);
+    if end.is_nan() || (end - reference).abs() > limit {
+        judge.fail(format!(
+            "{} of {}: {} at the end, expected {reference} {unit} within {limit} {unit}",
+            format!("{:?}", axis.axis).to_lowercase(),
+            axis.row,
+            quantity(end, unit),
+        ));
+    }
 }
 
 /// Whether the run was long enough to be judged [`JUDGED_AFTER_S`] after its hybrid law started.
@@ -145,6 +174,34 @@ mod tests {
         assert_eq!(quantity(0.0030049, "m"), "0.003005 m");
         assert_eq!(quantity(43.21, "N"), "43.21 N");
         assert_eq!(quantity(f64::NAN, "N"), "NaN N");
+    }
+
+    #[test]
+    fn axes_are_judged_by_what_they_are_to_bear() {
+        use mikoshi_config::scenario::Axis;
+        let limits = Thresholds { axis_reference_error_end_n: Some(0.5), ..Thresholds::default() };
+        let end_mean = [19.6, 4.4, 0.0, 7.0, 0.0, 0.0];
+        let rows = [InternalSummary { name: "L|R".into(), end_mean, ..InternalSummary::default() }];
+        let failures = |row: &str, axis, control, reference, expected_force| {
+            let axis = AxisControl { row: row.into(), axis, control, reference, expected_force };
+            let mut judge = Judge::default();
+            judge_axis(&mut judge, &limits, &axis, &rows);
+            judge.failures
+        };
+        assert_eq!(failures("L|R", Axis::X, Control::Force, 20.0, None), [""; 0]);
+        assert_eq!(
+            failures("L|R", Axis::X, Control::Force, -19.6, None),
+            ["x of L|R: 19.60 N at the end, expected -19.6 N within 0.5 N"]
+        );
+        // A position says nothing of a force, unless somebody knows what it takes.
+        assert_eq!(failures("L|R", Axis::Y, Control::Position, 0.01, None), [""; 0]);
+        assert_eq!(
+            failures("L|R", Axis::Y, Control::Position, 0.01, Some(5.0)),
+            ["y of L|R: 4.400 N at the end, expected 5 N within 0.5 N"]
+        );
+        // Moments have a limit of their own, and nothing that was not observed counts as met.
+        assert_eq!(failures("L|R", Axis::Roll, Control::Force, 0.0, None), [""; 0]);
+        assert_eq!(failures("object", Axis::X, Control::Force, 0.0, None).len(), 1);
     }
 
     #[test]
