@@ -3,7 +3,7 @@
 use crate::canonical::Observation;
 use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
 use crate::truth::{ObjectTracker, TrackedObject, is_loaded};
-use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotTruth, TeamState, mode};
+use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotState, RobotTruth, TeamState, mode};
 use mikoshi_spatial::{Object, Pose, World, Wrench};
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
@@ -14,6 +14,10 @@ const JUDGED_AFTER_S: f64 = 3.0;
 const WINDOW_S: f64 = 0.2;
 /// Length of the window in which measured and true internal forces are compared.
 const COMPARED_S: f64 = 1.0;
+/// A sole this far over where it stood takes a step.
+const LIFTED_M: f64 = 0.01;
+/// A drift is not divided by less.
+const LEAST_WALK_M: f64 = 0.1;
 const GRAVITY_M_S2: f64 = 9.81;
 
 /// What must be known of a robot to judge it.
@@ -78,6 +82,7 @@ pub struct JudgedFigures {
     pub robots: Vec<RobotSummary>,
     pub fell: Vec<String>,
     pub unintended_contact_ticks: u64,
+    pub drift_between_robots_m: f64,
 }
 
 impl Figures {
@@ -109,8 +114,9 @@ impl Figures {
         self.object.observe(&object);
         let team_state = &observation.team_state.payload;
         self.observe_internal_forces(observation.tick(), &object.internal, team_state);
-        for (figures, truth) in self.robots.iter_mut().zip(&observation.robot_truth) {
-            figures.observe(&truth.payload);
+        let seen = observation.robot_truth.iter().zip(&observation.robot_state);
+        for (figures, (truth, state)) in self.robots.iter_mut().zip(seen) {
+            figures.observe(&truth.payload, &state.payload);
         }
         if observation.object_truth.payload.unintended_contacts > 0 {
             self.unintended_contact_ticks += 1;
@@ -130,7 +136,7 @@ impl Figures {
         for (row, (summary, force_A)) in self.internal.iter_mut().zip(forces).enumerate() {
             let (force_n, moment_nm) = (force_A.force.norm(), force_A.moment.norm());
             let raise = |largest: &mut f64, value: f64| *largest = largest.max(value);
-            if tick >= start {
+            if tick >= *judged.start() {
                 raise(&mut summary.peak_n, force_n);
                 raise(&mut summary.peak_nm, moment_nm);
             }
@@ -157,11 +163,18 @@ impl Figures {
         }
     }
 
+    /// The largest difference between two robots' drifts.
+    fn drift_between_robots_m(&self) -> f64 {
+        let drifts = || self.robots.iter().map(RobotFigures::drift_m);
+        drifts().flat_map(|a| drifts().map(move |b| (a - b).norm())).fold(0.0, f64::max)
+    }
+
     /// The figures of all ticks observed.
     pub fn finish(mut self) -> JudgedFigures {
         for summary in &mut self.internal {
             summary.end_mean = summary.end_mean.map(|sum| sum / self.end_samples.max(1) as f64);
         }
+        let drift_between_robots_m = self.drift_between_robots_m();
         let robots = self.run.robots.iter().zip(&self.robots);
         JudgedFigures {
             object: self.object.finish(self.tracker.X_BodyA()),
@@ -170,6 +183,7 @@ impl Figures {
             internal_measurement_error_nm: self.measurement_error.1,
             fell: robots.clone().filter(|(_, f)| f.has_fallen).map(|(robot, _)| robot.name.clone()).collect(),
             robots: robots.map(|(robot, figures)| figures.finish(robot)).collect(),
+            drift_between_robots_m,
             unintended_contact_ticks: self.unintended_contact_ticks,
         }
     }
@@ -225,7 +239,10 @@ impl ObjectFigures {
 struct RobotFigures {
     weight_n: f64,
     limits_rad: Vec<(f64, f64)>,
-    touchdown: [Option<Vector2<f64>>; MAX_FEET],
+    feet: [FootFigures; MAX_FEET],
+    walked_m: f64,
+    /// Base's estimate minus truth at tick 0 and last.
+    base_error_m: Option<(Vector2<f64>, Vector2<f64>)>,
     zmp_margin_min_m: f64,
     foot_slip_max_m: f64,
     tilt_max_rad: f64,
@@ -236,12 +253,44 @@ struct RobotFigures {
     has_fallen: bool,
 }
 
+/// One foot.
+#[derive(Clone, Copy, Debug, Default)]
+struct FootFigures {
+    /// Where it was set down, while it bears.
+    touchdown: Option<Vector2<f64>>,
+    /// Where it was set down before it was lifted, and how high.
+    lifted_from: Option<Vector2<f64>>,
+    standing_z: f64,
+    slip_m: f64,
+}
+
+impl FootFigures {
+    /// One tick; the length of the step if one has just ended.
+    fn observe(&mut self, position: Vector2<f64>, z: f64, is_loaded: bool) -> Option<f64> {
+        if !is_loaded {
+            if z > self.standing_z + LIFTED_M && self.lifted_from.is_none() {
+                self.lifted_from = self.touchdown.take();
+            }
+            return None;
+        }
+        let Some(touchdown) = self.touchdown else {
+            self.touchdown = Some(position);
+            self.standing_z = z;
+            return self.lifted_from.take().map(|from| (position - from).norm());
+        };
+        self.slip_m = self.slip_m.max((position - touchdown).norm());
+        None
+    }
+}
+
 impl RobotFigures {
     fn new(robot: &ObservedRobot) -> Self {
         Self {
             weight_n: robot.mass_kg * GRAVITY_M_S2,
             limits_rad: robot.joints.iter().map(|joint| (joint.lower_rad, joint.upper_rad)).collect(),
-            touchdown: [None; MAX_FEET],
+            feet: [FootFigures::default(); MAX_FEET],
+            walked_m: 0.0,
+            base_error_m: None,
             zmp_margin_min_m: f64::INFINITY,
             foot_slip_max_m: 0.0,
             tilt_max_rad: 0.0,
@@ -253,7 +302,7 @@ impl RobotFigures {
         }
     }
 
-    fn observe(&mut self, truth: &RobotTruth) {
+    fn observe(&mut self, truth: &RobotTruth, state: &RobotState) {
         self.zmp_margin_min_m = self.zmp_margin_min_m.min(truth.zmp_margin_m);
         self.tilt_max_rad = self.tilt_max_rad.max(truth.tilt_rad);
         self.has_fallen |= truth.fallen != 0;
@@ -268,21 +317,23 @@ impl RobotFigures {
                 self.joint_margin_min_rad = (margin, joint);
             }
         }
-        for foot in 0..MAX_FEET {
-            let position = Vector2::new(truth.sole_pose[foot][0], truth.sole_pose[foot][1]);
-            let is_loaded = is_loaded(truth, foot, self.weight_n);
-            match self.touchdown[foot] {
-                Some(touchdown) if is_loaded => {
-                    self.foot_slip_max_m = self.foot_slip_max_m.max((position - touchdown).norm());
-                }
-                Some(_) => {
-                    self.touchdown[foot] = None;
-                    self.steps += 1;
-                }
-                None if is_loaded => self.touchdown[foot] = Some(position),
-                None => {}
-            }
+        for (index, foot) in self.feet.iter_mut().enumerate() {
+            let [x, y, z, ..] = truth.sole_pose[index];
+            let is_loaded = is_loaded(truth, index, self.weight_n);
+            let step_m = foot.observe(Vector2::new(x, y), z, is_loaded);
+            self.steps += u64::from(step_m.is_some());
+            // Two feet take two steps to bring the robot one step on.
+            self.walked_m += step_m.unwrap_or(0.0) / 2.0;
+            self.foot_slip_max_m = self.foot_slip_max_m.max(foot.slip_m);
         }
+        let horizontal = |pose: &[f64; 7]| Vector2::new(pose[0], pose[1]);
+        let error = horizontal(&state.base_pose) - horizontal(&truth.base_pose);
+        self.base_error_m = Some((self.base_error_m.map_or(error, |(first, _)| first), error));
+    }
+
+    /// How far the base's estimate has moved against the truth.
+    fn drift_m(&self) -> Vector2<f64> {
+        self.base_error_m.map_or_else(Vector2::zeros, |(first, last)| last - first)
     }
 
     fn finish(&self, robot: &ObservedRobot) -> RobotSummary {
@@ -296,6 +347,9 @@ impl RobotFigures {
             foot_slip_max_m: self.foot_slip_max_m,
             tilt_max_rad: self.tilt_max_rad,
             steps: self.steps,
+            walked_m: self.walked_m,
+            drift_m: self.drift_m().norm(),
+            drift_m_per_m: self.drift_m().norm() / self.walked_m.max(LEAST_WALK_M),
             joint_margin_min_rad,
             joint_margin_joint: robot.joints.get(nearest).map(|j| j.name.clone()).unwrap_or_default(),
             saturated_ticks: self.saturated_ticks,

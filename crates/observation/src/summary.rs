@@ -28,6 +28,8 @@ pub struct Summary {
     pub internal_measurement_error_n: f64,
     pub internal_measurement_error_nm: f64,
     pub robots: Vec<RobotSummary>,
+    /// How far the robots' own estimates have moved against each other, horizontally.
+    pub drift_between_robots_m: f64,
     /// Ticks in which something touched that nobody meant to.
     pub unintended_contact_ticks: u64,
     pub timing: Timing,
@@ -58,7 +60,7 @@ pub struct ObjectSummary {
 #[allow(missing_docs)]
 pub struct InternalSummary {
     pub name: String,
-    /// Largest from the start of the hybrid law on.
+    /// Largest once what was there at the start has had its 3 s to go.
     pub peak_n: f64,
     pub peak_nm: f64,
     /// When the hybrid law starts, or at tick 0 where it never does.
@@ -84,6 +86,12 @@ pub struct RobotSummary {
     pub foot_slip_max_m: f64,
     pub tilt_max_rad: f64,
     pub steps: u64,
+    /// Length of its walk: half of what its feet have stepped.
+    pub walked_m: f64,
+    /// How far its own estimate of its base has moved against the truth, horizontally.
+    pub drift_m: f64,
+    /// The same per metre walked, of at least 0.1 m.
+    pub drift_m_per_m: f64,
     pub joint_margin_min_rad: f64,
     /// The joint that came nearest to its limit.
     pub joint_margin_joint: String,

@@ -2,7 +2,7 @@
 
 use mikoshi_config::Scenario;
 use mikoshi_config::scenario::{AxisControl, Control, Thresholds};
-use mikoshi_observation::{InternalSummary, RobotSummary, Summary};
+use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
 
 /// How long after its start the hybrid law is judged.
 const JUDGED_AFTER_S: f64 = 3.0;
@@ -34,20 +34,37 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
         ("3 s after the start", is_judged_after_3s(scenario, summary.sim_time_s).then_some(rows));
     judge.internal_forces(observed, when, "N", limits.internal_after_3s_n, |row| row.after_3s_n);
     judge.internal_forces(observed, when, "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm);
+    judge.internal_forces(observed, "from 3 s on", "N", limits.internal_peak_n, |row| row.peak_n);
     judge.internal_forces(Some(rows), "at the end", "N", limits.internal_end_n, |row| row.end_n);
     judge.internal_forces(Some(rows), "at the end", "Nm", limits.internal_end_nm, |row| row.end_nm);
 
-    let peak = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
-    if let Some(limit) = limits.object_position_peak_m {
-        judge.at_most("object position error", peak(summary.object.position_peak_m), limit, "m");
-    }
-    if let Some(limit) = limits.object_attitude_peak_rad {
-        judge.at_most("object attitude error", peak(summary.object.attitude_peak_rad), limit, "rad");
-    }
+    judge_object(&mut judge, scenario, &summary.object);
     for robot in &summary.robots {
-        judge_robot(&mut judge, scenario, robot);
+        judge_robot(&mut judge, scenario, robot, summary.ticks);
     }
     judge.failures
+}
+
+fn judge_object(judge: &mut Judge, scenario: &Scenario, object: &ObjectSummary) {
+    let limits = &scenario.thresholds;
+    let worst = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
+    for (what, values, limit, unit) in [
+        ("object position error", object.position_peak_m, limits.object_position_peak_m, "m"),
+        ("object position error, RMS", object.position_rms_m, limits.object_position_rms_m, "m"),
+        ("object attitude error", object.attitude_peak_rad, limits.object_attitude_peak_rad, "rad"),
+        ("object attitude error, RMS", object.attitude_rms_rad, limits.object_attitude_rms_rad, "rad"),
+    ] {
+        if let Some(limit) = limit {
+            judge.at_most(what, worst(values), limit, unit);
+        }
+    }
+    let norm = |values: [f64; 3]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+    if let Some(limit) = limits.object_travel_min_m {
+        judge.at_least("way of the object", norm(object.travel_m), limit, "m");
+    }
+    if let Some(limit) = limits.object_travel_min_rad {
+        judge.at_least("turn of the object", norm(object.travel_rad), limit, "rad");
+    }
 }
 
 /// One axis that departs from the default, if what it is to bear is known.
@@ -80,7 +97,7 @@ pub fn is_judged_after_3s(scenario: &Scenario, sim_time_s: f64) -> bool {
     scenario.hybrid.start_s.unwrap_or(0.0) + JUDGED_AFTER_S < sim_time_s
 }
 
-fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary) {
+fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary, ticks: u64) {
     let limits = &scenario.thresholds;
     let name = &robot.name;
     if let Some(limit) = limits.foot_slip_max_m {
@@ -98,6 +115,10 @@ fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary) {
     {
         let ticks = robot.saturated_ticks;
         judge.fail(format!("drives of {name} saturated: {ticks} ticks, expected at most {limit}"));
+    }
+    if let Some(limit) = limits.saturated_share_max {
+        let share = robot.saturated_ticks as f64 / ticks.max(1) as f64;
+        judge.at_most(format_args!("share of ticks with saturated drives of {name}"), share, limit, "");
     }
 }
 

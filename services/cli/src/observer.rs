@@ -86,6 +86,7 @@ impl RunObserver {
             internal_measurement_error_n: figures.internal_measurement_error_n,
             internal_measurement_error_nm: figures.internal_measurement_error_nm,
             robots: figures.robots,
+            drift_between_robots_m: figures.drift_between_robots_m,
             unintended_contact_ticks: figures.unintended_contact_ticks,
             timing: self.stamps.timing(),
             faults,

@@ -52,7 +52,7 @@ pub fn standing_team(name: &str, overrides: &[(&str, &str)]) -> RunSpec {
         }
     });
     let robots = robots.collect();
-    RunSpec { ticks: scenario.ticks(), scenario, robots }
+    RunSpec { ticks: scenario.ticks(), scenario, robots, motion: vec![] }
 }
 
 fn about_z(degrees: f64) -> UnitQuaternion<f64> {
@@ -65,6 +65,7 @@ pub fn constant_commands(run: &RunSpec) -> Vec<JointCommand> {
         let mut command = JointCommand {
             joint_position_ref_rad: [0.0; MAX_JOINTS],
             joint_velocity_ref_rad_s: [0.0; MAX_JOINTS],
+            closed_hands: (1 << robot.grasping_hands.len()) - 1,
             team_command_tick: 0,
         };
         command.joint_position_ref_rad[..robot.initial_posture_rad.len()]
