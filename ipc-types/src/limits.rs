@@ -10,5 +10,8 @@ pub const MAX_HANDS: usize = 4;
 pub const MAX_JOINTS: usize = 64;
 /// Feet of one robot.
 pub const MAX_FEET: usize = 2;
+/// Age in ticks of the oldest team command that a servo may use: it bounds the queues. A loop with more
+/// delay has no usable gain left.
+pub const MAX_COORDINATION_DELAY_TICKS: u64 = 16;
 /// Grasping hands of one team.
 pub const MAX_HANDS_OF_TEAM: usize = MAX_ROBOTS * MAX_HANDS;

@@ -49,19 +49,28 @@ pub enum BuildWorldError {
 
 /// A step that could not be made, or whose result is not physics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("{}", self.text())]
 pub enum StepWorldError {
     /// There is not one command for each robot.
-    #[error("the number of joint commands is not the number of robots")]
     CommandCount,
     /// A command is NaN or infinite.
-    #[error("a joint command is not finite")]
     NotFinite,
     /// A position, velocity or acceleration became NaN, infinite or enormous.
-    #[error("the simulated world diverged")]
     Diverged,
     /// The simulator had no room for all contacts or constraints, and left some out.
-    #[error("the simulator ran out of memory for contacts")]
     OutOfMemory,
+}
+
+impl StepWorldError {
+    /// In words that a tick can pass on: without allocation.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::CommandCount => "the number of joint commands is not the number of robots",
+            Self::NotFinite => "a joint command is not finite",
+            Self::Diverged => "the simulated world diverged",
+            Self::OutOfMemory => "the simulator ran out of memory for contacts",
+        }
+    }
 }
 
 /// A checkpoint that does not belong to this world.

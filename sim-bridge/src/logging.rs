@@ -5,6 +5,9 @@ use std::sync::Once;
 
 static INSTALLED: Once = Once::new();
 
+/// The exit status of a process that its system has failed, as the `mikoshi` command documents it.
+const SYSTEM_FAULT: i32 = 3;
+
 /// Sends the simulator's messages to `tracing`, instead of to MUJOCO_LOG.TXT in whatever directory the
 /// process runs in.
 pub fn install() {
@@ -17,7 +20,11 @@ pub fn install() {
 
 fn forward(message: &MjLogMessage) {
     match message.level() {
-        MjtLogLevel::mjLOG_ERROR => tracing::error!("MuJoCo ends the process: {}", message.subject()),
+        MjtLogLevel::mjLOG_ERROR => {
+            // MuJoCo ends the process whatever is done here, but with the status of a run that failed.
+            eprintln!("error: MuJoCo: {}", message.subject());
+            std::process::exit(SYSTEM_FAULT);
+        }
         MjtLogLevel::mjLOG_WARNING => tracing::warn!("MuJoCo: {}", message.subject()),
         _ => tracing::debug!("MuJoCo: {}", message.subject()),
     }

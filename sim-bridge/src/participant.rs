@@ -1,6 +1,6 @@
 //! The bridge on a transport.
 
-use crate::{BuildWorldError, StepWorldError, World};
+use crate::{BuildWorldError, World};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, JointCommand, ObjectTruth, RobotTruth, Sensors, ServiceId};
 use mikoshi_runtime::{Call, ConnectError, Loan, Participant, Publisher, Subscriber, TickError, Transport};
@@ -91,14 +91,7 @@ impl<T: Transport> BridgeParticipant<T> {
             ports.command.receive(tick, &mut self.frame)?;
             *command = self.frame.payload;
         }
-        self.world.step(&self.commands).map_err(|error| {
-            TickError::Service(match error {
-                StepWorldError::CommandCount => "the number of joint commands is not the number of robots",
-                StepWorldError::NotFinite => "a joint command is not finite",
-                StepWorldError::Diverged => "the simulated world diverged",
-                StepWorldError::OutOfMemory => "the simulator ran out of memory for contacts",
-            })
-        })
+        self.world.step(&self.commands).map_err(|error| TickError::Service(error.text()))
     }
 }
 

@@ -3,13 +3,11 @@
 use super::checks::{Checks, Violation};
 use crate::robot::RobotConfig;
 use crate::scenario::{Control, Grasp, InternalForces, Member, Motion, Scenario};
-use mikoshi_ipc_types::MAX_ROBOTS;
+use mikoshi_ipc_types::{MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS};
 use std::collections::BTreeSet;
 
 /// Ratios of periods count as whole within this.
 const RATIO_TOLERANCE: f64 = 1e-9;
-/// Oldest command that the schedule of a tick can hold.
-const MAX_COORDINATION_DELAY_TICKS: u64 = 16;
 /// Longest delay of a sensor.
 const MAX_SENSOR_DELAY_TICKS: u64 = 1000;
 /// Longest run: a day at 1 kHz.

@@ -6,25 +6,23 @@
 
 #![allow(non_snake_case)]
 
-mod error;
 mod motion;
 mod robot;
 mod run_file;
 mod schedule;
 mod surface;
 
-pub use error::ResolveRunError;
 pub use run_file::{RunFileError, read_run, world_file, write_run, write_world};
 pub use schedule::tick_schedule;
 
-use mikoshi_config::{LoadedScenario, RunSpec};
+use mikoshi_config::{LoadConfigError, LoadedScenario, RunSpec};
 use robot::{Models, resolve_robot};
 
 /// The run of a scenario: every robot stands and holds at tick 0.
 ///
 /// # Errors
-/// A URDF or a robot's configuration can't be used, or a grasp is out of reach.
-pub fn resolve(loaded: &LoadedScenario) -> Result<RunSpec, ResolveRunError> {
+/// A URDF or a robot's configuration can't be used, or a grasp is out of reach: with file and line.
+pub fn resolve(loaded: &LoadedScenario) -> Result<RunSpec, LoadConfigError> {
     let scenario = &loaded.scenario;
     let models = Models::load(loaded)?;
     let robots = scenario

@@ -1,11 +1,10 @@
 //! One robot: how it stands and holds at tick 0.
 
-use crate::error::ResolveRunError;
 use crate::surface::distance_to_box;
 use core::fmt::Display;
 use mikoshi_config::robot::HandConfig;
 use mikoshi_config::scenario::{Member, Object as ObjectConfig};
-use mikoshi_config::{LoadedRobot, LoadedScenario, RobotSpec};
+use mikoshi_config::{LoadConfigError, LoadedRobot, LoadedScenario, RobotSpec};
 use mikoshi_humanoid::balance::{PerFoot, Side};
 use mikoshi_humanoid::ik::{IkScratch, IkTargets, SettlePostureError};
 use mikoshi_ipc_types::MAX_HANDS;
@@ -32,7 +31,7 @@ struct UsableModel<'a> {
 }
 
 impl<'a> Models<'a> {
-    pub(crate) fn load(scenario: &'a LoadedScenario) -> Result<Self, ResolveRunError> {
+    pub(crate) fn load(scenario: &'a LoadedScenario) -> Result<Self, LoadConfigError> {
         let usable = |(name, loaded): (&'a String, &'a LoadedRobot)| {
             let robot = Robot::new(&loaded.config, &loaded.urdf)
                 .map_err(|error| loaded.error_at(&error.key, error.problem))?;
@@ -48,10 +47,10 @@ pub(crate) fn resolve_robot(
     models: &Models<'_>,
     index: usize,
     member: &Member,
-) -> Result<RobotSpec, ResolveRunError> {
+) -> Result<RobotSpec, LoadConfigError> {
     let Some(usable) = models.0.get(member.model.as_str()) else {
         let problem = format!("found {:?}, expected a model that is loaded", member.model);
-        return Err(scenario.error_at(&format!("robots.{index}.model"), problem).into());
+        return Err(scenario.error_at(&format!("robots.{index}.model"), problem));
     };
     let config = &usable.loaded.config;
     let grasping_hands = grasping_hands(scenario, index, member, &config.hands)?;
@@ -65,12 +64,15 @@ pub(crate) fn resolve_robot(
         let X_AH = X_WA.inverse() * X_WH;
         let distance_m = distance_to_box(&X_AH.translation, &scenario.scenario.object.size_m);
         if distance_m.abs() > PALM_TO_SURFACE_M {
-            return Err(ResolveRunError::PalmOffSurface {
-                robot: member.name.clone(),
-                hand: config.hands[hand].name.clone(),
-                distance_m,
-                limit_m: PALM_TO_SURFACE_M,
-            });
+            let (hand, robot) = (&config.hands[hand].name, &member.name);
+            let side = if distance_m < 0.0 { "inside" } else { "off" };
+            let problem = format!(
+                "unreachable grasp: the {hand} palm of robot {robot} is {:.0} mm {side} the object's surface, \
+                 expected at most {:.0} mm",
+                distance_m.abs() * 1e3,
+                PALM_TO_SURFACE_M * 1e3
+            );
+            return Err(scenario.error_at(&format!("robots.{index}"), problem));
         }
         *target = Some(X_WH);
         hand_in_object.push(X_AH.to_array());
@@ -100,13 +102,13 @@ fn grasping_hands(
     index: usize,
     member: &Member,
     hands: &[HandConfig],
-) -> Result<Vec<usize>, ResolveRunError> {
+) -> Result<Vec<usize>, LoadConfigError> {
     let Some(names) = &member.hands else { return Ok((0..hands.len()).collect()) };
     let find = |(place, name): (usize, &String)| {
         hands.iter().position(|hand| hand.name == *name).ok_or_else(|| {
             let known = hands.iter().map(|hand| hand.name.as_str()).collect::<Vec<_>>().join(", ");
             let key = format!("robots.{index}.hands.{place}");
-            scenario.error_at(&key, format!("found {name:?}, expected one of {known}")).into()
+            scenario.error_at(&key, format!("found {name:?}, expected one of {known}"))
         })
     };
     names.iter().enumerate().map(find).collect()
@@ -150,7 +152,7 @@ fn settle(
     member: &Member,
     grasping_hands: &[usize],
     targets: &IkTargets,
-) -> Result<Vec<f64>, ResolveRunError> {
+) -> Result<Vec<f64>, LoadConfigError> {
     let unusable = |error: &dyn Display| {
         let problem = format!("found {:?}, expected a model that can be moved: {error}", member.model);
         scenario.error_at(&format!("robots.{index}.model"), problem)
@@ -160,15 +162,16 @@ fn settle(
     let mut scratch = IkScratch::new(&robot.model);
     let guess = &robot.carry_posture_rad;
     let settled = ik.settle(&robot.model, &mut scratch, guess, targets).map_err(|source| {
-        let robot = member.name.clone();
-        match source {
+        let name = &member.name;
+        let problem = match &source {
             SettlePostureError::UnreachableGrasp { hand, .. } => {
-                let hand =
-                    grasping_hands.get(hand).map(|&hand| usable.loaded.config.hands[hand].name.clone());
-                ResolveRunError::HandOutOfReach { robot, hand: hand.unwrap_or_default(), source }
+                let hand = grasping_hands.get(*hand).map(|&hand| &usable.loaded.config.hands[hand].name);
+                let hand = hand.map_or("?", String::as_str);
+                format!("unreachable grasp: the {hand} hand of robot {name}: {source}")
             }
-            _ => ResolveRunError::NoStance { robot, source },
-        }
+            _ => format!("robot {name} can't stand as it should: {source}"),
+        };
+        scenario.error_at(&format!("robots.{index}"), problem)
     })?;
     Ok(settled.joint_position[..robot.model.joint_count()].to_vec())
 }

@@ -32,9 +32,7 @@ pub use process::ProcessIdentity;
 pub use real_time::{MissingRight, OnMissingRight, RealTime};
 pub use run_directory::{FoundRun, RunDirectory, RunDirectoryError};
 pub use runner::{Participant, RunFault, Session, run_in_one_thread, run_service};
-pub use schedule::{
-    Call, Input, MAX_AGE_TICKS, Output, Phase, Placement, Position, ScheduleError, TickSchedule,
-};
+pub use schedule::{Call, Input, Output, Phase, Placement, Position, ScheduleError, TickSchedule};
 pub use topic::Topic;
 pub use transport::iceoryx::{IceoryxTap, IceoryxTransport, OpenError, required_bytes};
 pub use transport::memory::{InMemoryHub, InMemoryTap, InMemoryTransport};

@@ -5,8 +5,8 @@
 use crate::Topic;
 use core::fmt;
 use mikoshi_ipc_types::{
-    Audience, JointCommand, MAX_ROBOTS, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, ServiceId,
-    TeamCommand, TeamState,
+    Audience, JointCommand, MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS, ObjectTruth, Payload, RobotState,
+    RobotTruth, Sensors, ServiceId, TeamCommand, TeamState,
 };
 
 /// What a service does in a phase.
@@ -133,7 +133,7 @@ impl Position {
 pub enum ScheduleError {
     #[error("a team has 1 to {MAX_ROBOTS} robots, not {0}")]
     TeamSize(usize),
-    #[error("a coordination delay is at most {MAX_AGE_TICKS} ticks, not {0}")]
+    #[error("a coordination delay is at most {MAX_COORDINATION_DELAY_TICKS} ticks, not {0}")]
     Age(u64),
     #[error("{0} is published twice in a tick")]
     PublishedTwice(Topic),
@@ -144,10 +144,6 @@ pub enum ScheduleError {
     #[error("{service} has {call} twice in a tick")]
     CalledTwice { service: ServiceId, call: Call },
 }
-
-/// The oldest command that can be scheduled: it bounds the queues. Loops with more delay than this
-/// have no usable gain left.
-pub const MAX_AGE_TICKS: u64 = 16;
 
 /// The phases of a tick in canonical order.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,7 +157,7 @@ impl TickSchedule {
     /// `coordination_delay_ticks` is the age of the team command that a servo uses: 0 in lockstep.
     ///
     /// # Errors
-    /// A team without robots or with more than [`MAX_ROBOTS`]; a delay above [`MAX_AGE_TICKS`].
+    /// A team without robots or with more than [`MAX_ROBOTS`]; a delay above [`MAX_COORDINATION_DELAY_TICKS`].
     pub fn of_team(
         robots: usize,
         coordination_delay_ticks: u64,
@@ -228,7 +224,7 @@ impl TickSchedule {
     ///
     /// # Errors
     /// An input that has no producer, or whose producer comes later in the same tick; a topic that is
-    /// published twice; a call that a service has twice; an age above [`MAX_AGE_TICKS`].
+    /// published twice; a call that a service has twice; an age above [`MAX_COORDINATION_DELAY_TICKS`].
     pub fn new(phases: Vec<Phase>) -> Result<Self, ScheduleError> {
         for (index, phase) in phases.iter().enumerate() {
             let (service, call) = (phase.service, phase.call);
@@ -236,7 +232,7 @@ impl TickSchedule {
                 return Err(ScheduleError::CalledTwice { service, call });
             }
             for &Input { topic, from, age_ticks } in &phase.inputs {
-                if age_ticks > MAX_AGE_TICKS {
+                if age_ticks > MAX_COORDINATION_DELAY_TICKS {
                     return Err(ScheduleError::Age(age_ticks));
                 }
                 let produces =
@@ -455,7 +451,10 @@ mod tests {
         let of_team = |robots, delay| TickSchedule::of_team(robots, delay, &Placement::default());
         assert_eq!(of_team(0, 0), Err(ScheduleError::TeamSize(0)));
         assert_eq!(of_team(MAX_ROBOTS + 1, 0), Err(ScheduleError::TeamSize(MAX_ROBOTS + 1)));
-        assert_eq!(of_team(4, MAX_AGE_TICKS + 1), Err(ScheduleError::Age(MAX_AGE_TICKS + 1)));
+        assert_eq!(
+            of_team(4, MAX_COORDINATION_DELAY_TICKS + 1),
+            Err(ScheduleError::Age(MAX_COORDINATION_DELAY_TICKS + 1))
+        );
     }
 
     /// Where a team of two stops that stops one service at this position.

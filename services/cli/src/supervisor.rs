@@ -260,6 +260,8 @@ fn describe(process: &ServiceProcess, status: Option<&SlotStatus>) -> Failure {
             exit_status = Status::Usage;
             message += " can't run this scenario";
         }
+        // It says itself what failed.
+        None if code == Some(3) => message += " failed",
         None => {
             if let Some(simulator) = binaries::simulator_version().err().filter(|_| code == Some(127)) {
                 return simulator.context(message);

@@ -1,7 +1,7 @@
 //! The coordinator on a transport.
 
 use crate::build::BuildCoordinatorError;
-use crate::tick::{CoordinateError, Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState};
+use crate::tick::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, RobotState, ServiceId, TeamCommand, TeamState};
 use mikoshi_runtime::{Call, Loan, Participant, Publisher, Subscriber, TickError, Transport};
@@ -43,15 +43,9 @@ impl<T: Transport> CoordinatorParticipant<T> {
             port.receive(tick, frame)?;
         }
         let robots = self.robot_states.iter().map(|frame| &frame.payload);
-        self.coordinator.tick(tick, &mut self.state, &mut self.scratch, robots, &mut self.outputs).map_err(
-            |error| {
-                TickError::Service(match error {
-                    CoordinateError::HandPose => "a hand's pose is not a pose",
-                    CoordinateError::State => "the state holds a value that no tick leaves",
-                    CoordinateError::Law => "the hybrid law rejects its inputs",
-                })
-            },
-        )?;
+        self.coordinator
+            .tick(tick, &mut self.state, &mut self.scratch, robots, &mut self.outputs)
+            .map_err(|error| TickError::Service(error.text()))?;
         for (port, command) in self.command_ports.iter_mut().zip(&self.outputs.commands) {
             send(port, tick, command)?;
         }

@@ -69,14 +69,23 @@ pub struct CoordinatorOutputs {
 
 /// Why a tick could not be computed. The state is as it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", self.text())]
 #[allow(missing_docs)]
 pub enum CoordinateError {
-    #[error("a hand's pose is not a pose")]
     HandPose,
-    #[error("the state holds a value that no tick leaves")]
     State,
-    #[error("the hybrid law rejects its inputs")]
     Law,
+}
+
+impl CoordinateError {
+    /// In words that a tick can pass on: without allocation.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::HandPose => "a hand's pose is not a pose",
+            Self::State => "the state holds a value that no tick leaves",
+            Self::Law => "the hybrid law rejects its inputs",
+        }
+    }
 }
 
 impl Coordinator {

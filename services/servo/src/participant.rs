@@ -1,7 +1,7 @@
 //! A servo on a transport.
 
 use crate::robot::BuildRobotError;
-use crate::tick::{Servo, ServoError, ServoScratch, ServoState};
+use crate::tick::{Servo, ServoScratch, ServoState};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, JointCommand, RobotState, Sensors, ServiceId, TeamCommand};
 use mikoshi_runtime::{Call, ConnectError, Loan, Participant, Publisher, Subscriber, TickError, Transport};
@@ -75,7 +75,7 @@ impl<T: Transport> ServoParticipant<T> {
         let mut loan = self.joint_port.loan(tick)?;
         self.servo
             .act(&mut self.state, &mut self.scratch, command, loan.payload_mut())
-            .map_err(service_error)?;
+            .map_err(|error| TickError::Service(error.text()))?;
         loan.send()
     }
 }
@@ -92,12 +92,4 @@ impl<T: Transport> Participant for ServoParticipant<T> {
             _ => Err(TickError::UnknownCall),
         }
     }
-}
-
-fn service_error(error: ServoError) -> TickError {
-    TickError::Service(match error {
-        ServoError::HandReference => "a hand reference is not a pose",
-        ServoError::StepClock => "the team's step clock is none",
-        ServoError::InverseKinematics => "the inverse kinematics rejects its inputs",
-    })
 }

@@ -51,14 +51,23 @@ pub struct ServoScratch {
 
 /// Why half a tick could not be computed. The state is as it was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", self.text())]
 #[allow(missing_docs)]
 pub enum ServoError {
-    #[error("a hand reference is not a pose")]
     HandReference,
-    #[error("the team's step clock is none")]
     StepClock,
-    #[error("the inverse kinematics rejects its inputs")]
     InverseKinematics,
+}
+
+impl ServoError {
+    /// In words that a tick can pass on: without allocation.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::HandReference => "a hand reference is not a pose",
+            Self::StepClock => "the team's step clock is none",
+            Self::InverseKinematics => "the inverse kinematics rejects its inputs",
+        }
+    }
 }
 
 impl Servo {

@@ -141,6 +141,23 @@ fn a_run_that_could_not_begin_leaves_no_results() {
     assert!(!out.exists());
 }
 
+#[test]
+fn a_world_that_the_simulator_rejects_is_a_fault_and_can_be_looked_at() {
+    let copy = Copy::new();
+    fs::write(copy.path("robots/arm.stl"), "no mesh").expect("it can be written");
+    let urdf = fs::read_to_string(copy.path("robots/hrp2.urdf")).expect("it was copied");
+    let collision = urdf.find("<collision>").expect("it has collisions");
+    let start = collision + urdf[collision..].find("<box ").expect("it has boxes");
+    let end = start + urdf[start..].find("/>").expect("it is closed") + "/>".len();
+    copy.replace("robots/hrp2.urdf", &urdf[start..end], "<mesh filename=\"package://here/arm.stl\"/>");
+    copy.replace("robots/hrp2.toml", "urdf = ", "packages = { here = \".\" }\nurdf = ");
+    for arguments in [&[][..], &["--in-process"]] {
+        let results = Results::new();
+        run(&copy.hold(), arguments, &results).expect_error(3, &["MuJoCo rejects the world", "arm.stl"]);
+        assert!(fs::read_to_string(results.world()).expect("it was described").contains("arm.stl"));
+    }
+}
+
 /// The loader finds a file of the library's name that is no library.
 #[test]
 fn a_simulator_that_can_not_be_loaded_is_a_fault_with_a_way_out() {

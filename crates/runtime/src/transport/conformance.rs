@@ -276,7 +276,7 @@ fn frames_arrive_with_all_their_bytes_tick_by_tick<R: Run>() {
 }
 
 fn a_queue_holds_commands_of_the_oldest_age_in_use<R: Run>() {
-    let delay = crate::MAX_AGE_TICKS;
+    let delay = mikoshi_ipc_types::MAX_COORDINATION_DELAY_TICKS;
     let run = R::of(TickSchedule::of_team(1, delay, &Placement::default()).expect("a valid team"));
     let servo = run.transport(ServiceId::Servo(0));
     let mut commands = servo.subscriber::<TeamCommand>(0).expect("an input");

@@ -37,7 +37,14 @@ fn execute(
     let xml = world_xml(run).map_err(Failure::usage)?;
     fs::write(out.world(), xml).map_err(|error| Failure::fault(error).context(out.world().display()))?;
     let mut team_tap = TeamTap::new(&hub.tap(), run.robots.len()).map_err(Failure::fault)?;
-    let mut participants = participants(prepared, &hub)?;
+    let mut participants = match participants(prepared, &hub) {
+        Ok(participants) => participants,
+        // Whoever looks for the reason needs what there is: the world, for one.
+        Err(failure) if failure.status == Status::Fault => {
+            return Ok(Outcome::Fault { failure, faults: vec![] });
+        }
+        Err(failure) => return Err(failure),
+    };
     let mut observation = Observation::for_team(run.robots.len());
 
     let mut early_end = None;
