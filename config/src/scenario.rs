@@ -129,6 +129,13 @@ pub struct Hybrid {
     pub hand_stiffness_n_m: f64,
     /// The same about an axis.
     pub hand_stiffness_nm_rad: f64,
+    /// How stiff a grasp is by itself, as calibrated: what yields between palm and object is seen by no
+    /// encoder, but by wrist sensors. Rigid when absent.
+    #[serde(default)]
+    pub grasp_stiffness_n_m: Option<f64>,
+    /// The same about an axis.
+    #[serde(default)]
+    pub grasp_stiffness_nm_rad: Option<f64>,
     /// Corner frequency of the wrist wrench filter.
     pub filter_hz: f64,
     /// Which internal forces are controlled.

@@ -145,6 +145,12 @@ fn hybrid(checks: &mut Checks, scenario: &Scenario, arms: Option<usize>) {
     checks.positive("hybrid.loop_gain", hybrid.loop_gain);
     checks.positive("hybrid.hand_stiffness_n_m", hybrid.hand_stiffness_n_m);
     checks.positive("hybrid.hand_stiffness_nm_rad", hybrid.hand_stiffness_nm_rad);
+    for (key, stiffness) in [
+        ("hybrid.grasp_stiffness_n_m", hybrid.grasp_stiffness_n_m),
+        ("hybrid.grasp_stiffness_nm_rad", hybrid.grasp_stiffness_nm_rad),
+    ] {
+        checks.positive(key, stiffness.unwrap_or(1.0));
+    }
     checks.positive("hybrid.filter_hz", hybrid.filter_hz);
     if let (InternalForces::Matrix(rows), Some(arms)) = (&hybrid.internal_forces, arms) {
         let key = "hybrid.internal_forces.matrix";

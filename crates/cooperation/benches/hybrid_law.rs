@@ -59,7 +59,8 @@ fn tick(bencher: Bencher, internal_forces: InternalForces) {
     let object_twist = Twist::new(Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.05));
     let reference = HybridReference { force: &force, position: &position, object_twist };
     bencher.bench_local(|| {
-        let inputs = HybridInputs { hands: black_box(&hands), reference: Some(reference) };
+        let inputs =
+            HybridInputs { hands: black_box(&hands), grasp_yield: Twist::zero(), reference: Some(reference) };
         law.act(&mut state, &mut scratch, &inputs, &mut out)
     });
 }

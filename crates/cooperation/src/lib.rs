@@ -58,7 +58,8 @@
 //!     position: &GeneralizedPosition::at_grasp(X_WA, 2),
 //!     object_twist: Twist::zero(),
 //! };
-//! law.act(&mut state, &mut scratch, &HybridInputs { hands: &hands, reference: Some(reference) }, &mut out)?;
+//! let inputs = HybridInputs { hands: &hands, grasp_yield: Twist::zero(), reference: Some(reference) };
+//! law.act(&mut state, &mut scratch, &inputs, &mut out)?;
 //!
 //! // So each gives way by 2 % of what its 10 N compress.
 //! assert_eq!(out.force.internal[0].force.x, 10.0);

@@ -74,7 +74,7 @@ impl Case {
     }
 
     fn inputs(&self) -> HybridInputs<'_> {
-        HybridInputs { hands: &self.hands, reference: Some(self.reference()) }
+        HybridInputs { hands: &self.hands, grasp_yield: Twist::zero(), reference: Some(self.reference()) }
     }
 
     fn reference(&self) -> HybridReference<'_> {
@@ -200,7 +200,7 @@ fn the_filter_is_a_first_order_low_pass() {
     };
     let (mut state, mut scratch, mut out) = (case.state(), case.law.scratch(), case.law.output());
     let mut force = |case: &Case| {
-        let inputs = HybridInputs { hands: &case.hands, reference: None };
+        let inputs = HybridInputs { hands: &case.hands, grasp_yield: Twist::zero(), reference: None };
         case.law.act(&mut state, &mut scratch, &inputs, &mut out).unwrap();
         out.force.clone()
     };
@@ -292,7 +292,7 @@ fn a_run_continues_from_a_copied_state_as_if_nothing_had_happened() {
         position: &world.position_ref,
         object_twist: world.twist_ref,
     };
-    let inputs = HybridInputs { hands: &hands, reference: Some(reference) };
+    let inputs = HybridInputs { hands: &hands, grasp_yield: Twist::zero(), reference: Some(reference) };
     successor.act(&mut restored, &mut scratch, &inputs, &mut out).unwrap();
     world.law.act(&mut world.state, &mut world.scratch, &inputs, &mut world.out).unwrap();
     assert_eq!(bytemuck::bytes_of(&restored), bytemuck::bytes_of(&world.state));
@@ -306,7 +306,7 @@ fn a_tick_allocates_nothing() {
     {
         let case = Case::new(internal_forces);
         let (mut state, mut scratch, mut out) = (case.state(), case.law.scratch(), case.law.output());
-        let hold = HybridInputs { hands: &case.hands, reference: None };
+        let hold = HybridInputs { hands: &case.hands, grasp_yield: Twist::zero(), reference: None };
         assert_no_alloc(|| {
             for inputs in [hold, case.inputs(), case.inputs()] {
                 case.law.act(&mut state, &mut scratch, &inputs, &mut out).unwrap();

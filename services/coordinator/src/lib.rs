@@ -8,6 +8,7 @@
 #![allow(non_snake_case)]
 
 mod build;
+mod grasp;
 mod object_motion;
 mod participant;
 mod reference;

@@ -1,6 +1,7 @@
 //! One tick of the team's controller. No allocation, no clock, no I/O, no panic path.
 
 use crate::build::{BuildCoordinatorError, build_hybrid_law, virtual_sticks};
+use crate::grasp::GraspCompliance;
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::reference::References;
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
@@ -19,6 +20,7 @@ use mikoshi_spatial::{Hand, Pose, Twist, World, Wrench};
 pub struct Coordinator {
     law: HybridLaw,
     references: References,
+    compliance: GraspCompliance,
     motion: ObjectMotion,
     timing: StepTiming,
     /// Tick at which the object is first asked to move; it never is when absent.
@@ -37,6 +39,8 @@ pub struct CoordinatorState {
     /// The object's reference, from where the virtual sticks saw it when the hybrid law started.
     motion: ObjectMotionState,
     clock: TeamClockState,
+    /// What each hand applies to the object, filtered.
+    hand_wrench: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// Generalized force then, row by row.
     force_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// One of [`mode`].
@@ -100,6 +104,7 @@ impl Coordinator {
         Ok(Self {
             law,
             references,
+            compliance: GraspCompliance::new(scenario),
             motion: ObjectMotion::new(run),
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
@@ -118,6 +123,7 @@ impl Coordinator {
             hybrid: HybridState::at_grasp(&self.sticks)?,
             motion: ObjectMotionState::at_rest(&Pose::identity()),
             clock: TeamClockState::default(),
+            hand_wrench: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             team_mode: mode::HOLD,
         })
@@ -147,6 +153,7 @@ impl Coordinator {
     ) -> Result<(), CoordinateError> {
         let CoordinatorScratch { law: law_scratch, law_output, hands, force_ref, position_ref } = scratch;
         read_hands(robots.clone(), &self.hands_of_robots, hands)?;
+        let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands)?;
         let wishes = Wishes::of(robots);
 
         let is_hybrid = mode::is_hybrid(state.team_mode);
@@ -165,28 +172,52 @@ impl Coordinator {
             position: position_ref,
             object_twist: motion.twist(),
         });
-        let inputs = HybridInputs { hands, reference };
+        let inputs = HybridInputs { hands, grasp_yield, reference };
         self.law
             .act(&mut state.hybrid, law_scratch, &inputs, law_output)
             .map_err(|_| CoordinateError::Law)?;
-        (state.motion, state.clock) = (motion, clock);
+        (state.motion, state.clock, state.hand_wrench) = (motion, clock, hand_wrench);
 
         self.write_commands(tick, state, law_output, out);
         write_team_state(state, law_output, is_hybrid.then_some((&*force_ref, &*position_ref)), out);
         out.team_state.speed_share = speed_share;
         if state.team_mode == mode::HOLD && self.hybrid_start_tick.is_some_and(|start| tick + 1 >= start) {
-            self.start_hybrid(state, hands, law_output);
+            self.start_hybrid(state, hands, &grasp_yield, law_output);
         }
         Ok(())
+    }
+
+    /// How far the object is from where rigid grasps would have it, and the filtered wrenches that say so.
+    fn grasp_yield(
+        &self,
+        state: &CoordinatorState,
+        hands: &[HandInput],
+    ) -> Result<([[f64; 6]; MAX_HANDS_OF_TEAM], Twist<World>), CoordinateError> {
+        let mut sticks = [VirtualStick { X_HB: Pose::identity() }; MAX_HANDS_OF_TEAM];
+        for (stick, array) in sticks.iter_mut().zip(&state.hybrid.sticks).take(hands.len()) {
+            stick.X_HB = Pose::from_array(array).ok_or(CoordinateError::State)?;
+        }
+        let mut hand_wrench = state.hand_wrench;
+        let shares = self.law.internal_forces().w_inverse();
+        let found = self.compliance.object_yield(&mut hand_wrench, hands.iter().zip(&sticks), shares);
+        Ok((hand_wrench, found))
     }
 
     /// Creates the virtual sticks anew from the hands as they are now (section 4.3, step 2): whatever the
     /// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the
     /// object from here on. Control starts where the object is, not where it should be: nothing jumps.
-    fn start_hybrid(&self, state: &mut CoordinatorState, hands: &[HandInput], law: &HybridOutput) {
+    fn start_hybrid(
+        &self,
+        state: &mut CoordinatorState,
+        hands: &[HandInput],
+        grasp_yield: &Twist<World>,
+        law: &HybridOutput,
+    ) {
         let X_WA = &law.position.external;
+        // Where they coincide if nothing yields: what yields is added to their mean in every tick.
+        let X_WB = X_WA.displaced(&-*grasp_yield);
         for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
-            *slot = VirtualStick::at_grasp(&hand.pose, X_WA).X_HB.to_array();
+            *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
         }
         state.motion = ObjectMotionState::at_rest(X_WA);
         write_force(&law.force, &mut state.force_at_start);

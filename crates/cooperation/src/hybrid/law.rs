@@ -88,6 +88,7 @@ impl HybridLaw {
 
         let hands = sticks.iter().zip(inputs.hands).map(|(stick, hand)| (*stick, hand.pose, hand.wrench));
         workspace.evaluate(&self.internal_forces, hands, h_c, z_c);
+        z_c.external = z_c.external.displaced(&inputs.grasp_yield);
         self.filter(state, h_c);
         state.ticks += 1;
 
@@ -185,6 +186,7 @@ impl HybridLaw {
                 && reference.position.internal.iter().all(Twist::is_finite)
         };
         let is_finite = inputs.hands.iter().all(is_hand_finite)
+            && inputs.grasp_yield.is_finite()
             && inputs.reference.as_ref().is_none_or(is_reference_finite);
         if is_finite { Ok(()) } else { Err(HybridError::NonFiniteInput) }
     }

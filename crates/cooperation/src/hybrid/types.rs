@@ -30,6 +30,9 @@ pub struct HybridReference<'a> {
 pub struct HybridInputs<'a> {
     /// The n hands, in hand order.
     pub hands: &'a [HandInput],
+    /// How far the object is from where rigid grasps would have it: where palms yield, hands don't tell
+    /// where the object is. Zero if they don't, or nobody knows.
+    pub grasp_yield: Twist<World>,
     /// What to control; nothing is controlled without it, and hand references hold.
     pub reference: Option<HybridReference<'a>>,
 }

@@ -169,7 +169,7 @@ impl ClosedLoop {
             position: &self.position_ref,
             object_twist: self.twist_ref,
         });
-        let inputs = HybridInputs { hands: &hands, reference };
+        let inputs = HybridInputs { hands: &hands, grasp_yield: Twist::zero(), reference };
         self.law.act(&mut self.state, &mut self.scratch, &inputs, &mut self.out).unwrap();
         self.hands.pop_front();
         self.hands.push_back(self.out.hands.iter().map(|hand| hand.pose).collect());
