@@ -2,7 +2,7 @@
 
 use crate::canonical::Observation;
 use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
-use crate::truth::{ObjectTracker, TrackedObject, is_loaded};
+use crate::truth::{FootTracker, ObjectTracker, TrackedObject};
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotState, RobotTruth, TeamState, mode};
 use mikoshi_spatial::{Object, Pose, World, Wrench};
 use nalgebra::Vector2;
@@ -14,11 +14,8 @@ const JUDGED_AFTER_S: f64 = 3.0;
 const WINDOW_S: f64 = 0.2;
 /// Length of the window in which measured and true internal forces are compared.
 const COMPARED_S: f64 = 1.0;
-/// A sole this far over where it stood takes a step.
-const LIFTED_M: f64 = 0.01;
 /// A drift is not divided by less.
 const LEAST_WALK_M: f64 = 0.1;
-const GRAVITY_M_S2: f64 = 9.81;
 
 /// What must be known of a robot to judge it.
 #[derive(Clone, Debug)]
@@ -239,7 +236,7 @@ impl ObjectFigures {
 struct RobotFigures {
     weight_n: f64,
     limits_rad: Vec<(f64, f64)>,
-    feet: [FootFigures; MAX_FEET],
+    feet: [FootTracker; MAX_FEET],
     walked_m: f64,
     /// Base's estimate minus truth at tick 0 and last.
     base_error_m: Option<(Vector2<f64>, Vector2<f64>)>,
@@ -253,42 +250,12 @@ struct RobotFigures {
     has_fallen: bool,
 }
 
-/// One foot.
-#[derive(Clone, Copy, Debug, Default)]
-struct FootFigures {
-    /// Where it was set down, while it bears.
-    touchdown: Option<Vector2<f64>>,
-    /// Where it was set down before it was lifted, and how high.
-    lifted_from: Option<Vector2<f64>>,
-    standing_z: f64,
-    slip_m: f64,
-}
-
-impl FootFigures {
-    /// One tick; the length of the step if one has just ended.
-    fn observe(&mut self, position: Vector2<f64>, z: f64, is_loaded: bool) -> Option<f64> {
-        if !is_loaded {
-            if z > self.standing_z + LIFTED_M && self.lifted_from.is_none() {
-                self.lifted_from = self.touchdown.take();
-            }
-            return None;
-        }
-        let Some(touchdown) = self.touchdown else {
-            self.touchdown = Some(position);
-            self.standing_z = z;
-            return self.lifted_from.take().map(|from| (position - from).norm());
-        };
-        self.slip_m = self.slip_m.max((position - touchdown).norm());
-        None
-    }
-}
-
 impl RobotFigures {
     fn new(robot: &ObservedRobot) -> Self {
         Self {
-            weight_n: robot.mass_kg * GRAVITY_M_S2,
+            weight_n: robot.weight_n(),
             limits_rad: robot.joints.iter().map(|joint| (joint.lower_rad, joint.upper_rad)).collect(),
-            feet: [FootFigures::default(); MAX_FEET],
+            feet: [FootTracker::default(); MAX_FEET],
             walked_m: 0.0,
             base_error_m: None,
             zmp_margin_min_m: f64::INFINITY,
@@ -318,13 +285,11 @@ impl RobotFigures {
             }
         }
         for (index, foot) in self.feet.iter_mut().enumerate() {
-            let [x, y, z, ..] = truth.sole_pose[index];
-            let is_loaded = is_loaded(truth, index, self.weight_n);
-            let step_m = foot.observe(Vector2::new(x, y), z, is_loaded);
+            let step_m = foot.observe(truth, index, self.weight_n);
             self.steps += u64::from(step_m.is_some());
             // Two feet take two steps to bring the robot one step on.
             self.walked_m += step_m.unwrap_or(0.0) / 2.0;
-            self.foot_slip_max_m = self.foot_slip_max_m.max(foot.slip_m);
+            self.foot_slip_max_m = self.foot_slip_max_m.max(foot.slip_m());
         }
         let horizontal = |pose: &[f64; 7]| Vector2::new(pose[0], pose[1]);
         let error = horizontal(&state.base_pose) - horizontal(&truth.base_pose);

@@ -18,4 +18,4 @@ pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError};
 pub use summary::{Fault, InternalSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
 pub use tap::TeamTap;
-pub use truth::{ObjectTracker, TrackedObject, is_loaded};
+pub use truth::{FootTracker, ObjectTracker, TrackedObject, is_loaded};

@@ -1,18 +1,73 @@
-//! Where the object truly is and what is truly in it, seen through the frames that control creates when it
-//! starts.
+//! Where object and feet truly are, and what is truly in the object, seen through the frames that control
+//! creates when it starts.
 
 use crate::canonical::Observation;
-use crate::figures::ObservedRun;
+use crate::figures::{ObservedRobot, ObservedRun};
 use mikoshi_cooperation::VirtualStick;
 use mikoshi_ipc_types::{RobotTruth, mode};
 use mikoshi_spatial::{Hand, Object, Pose, World, Wrench};
+use nalgebra::Vector2;
 
 /// A sole is set down while it bears more than this share of the robot's weight.
 const LOADED_SHARE: f64 = 0.05;
 
+/// A sole this far over where it stood takes a step.
+const LIFTED_M: f64 = 0.01;
+/// Standard gravity, as the simulator has it.
+const GRAVITY_M_S2: f64 = 9.81;
+
+impl ObservedRobot {
+    /// Its weight.
+    pub fn weight_n(&self) -> f64 {
+        self.mass_kg * GRAVITY_M_S2
+    }
+}
+
 /// Whether a foot is set down.
 pub fn is_loaded(truth: &RobotTruth, foot: usize, weight_n: f64) -> bool {
     truth.ground_wrench.get(foot).is_some_and(|wrench| wrench[2] > LOADED_SHARE * weight_n)
+}
+
+/// Follows a foot from where it is set down to where it is set down next. Ticks come in order.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FootTracker {
+    /// Where it was set down, until it is lifted.
+    touchdown: Option<Vector2<f64>>,
+    /// Where it was set down before it was lifted.
+    lifted_from: Option<Vector2<f64>>,
+    standing_z: f64,
+    slip_m: f64,
+}
+
+impl FootTracker {
+    /// Takes in one tick; the length of the step if one has just ended.
+    pub fn observe(&mut self, truth: &RobotTruth, foot: usize, weight_n: f64) -> Option<f64> {
+        let [x, y, z, ..] = *truth.sole_pose.get(foot)?;
+        let position = Vector2::new(x, y);
+        if !is_loaded(truth, foot, weight_n) {
+            if z > self.standing_z + LIFTED_M && self.lifted_from.is_none() {
+                self.lifted_from = self.touchdown.take();
+            }
+            return None;
+        }
+        let Some(touchdown) = self.touchdown else {
+            self.touchdown = Some(position);
+            self.standing_z = z;
+            return self.lifted_from.take().map(|from| (position - from).norm());
+        };
+        self.slip_m = self.slip_m.max((position - touchdown).norm());
+        None
+    }
+
+    /// Whether it has been set down, and not been lifted since.
+    pub fn is_down(&self) -> bool {
+        self.touchdown.is_some()
+    }
+
+    /// Its largest horizontal displacement since it was set down.
+    pub fn slip_m(&self) -> f64 {
+        self.slip_m
+    }
 }
 
 /// Follows the object through a run, by ground truth. Ticks come in order.
