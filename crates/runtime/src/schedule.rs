@@ -497,6 +497,14 @@ mod tests {
     }
 
     #[test]
+    fn at_first_all_wait_for_the_world_and_then_for_one_another() {
+        let schedule = team_of(2, 0);
+        assert_eq!(schedule.unhindered(|_| Position::default()), [ServiceId::Bridge]);
+        let after_sensors = |id| Position { tick: 0, phase: usize::from(id == ServiceId::Bridge) };
+        assert_eq!(schedule.unhindered(after_sensors), [ServiceId::Servo(0), ServiceId::Servo(1)]);
+    }
+
+    #[test]
     fn who_has_ended_keeps_nobody_waiting() {
         let schedule = team_of(2, 0);
         assert_eq!(schedule.unhindered(|_| Position::END), []);
