@@ -37,6 +37,8 @@ pub(crate) struct LegsState {
     sole_correction: SoleCorrection,
     /// How much of the base's estimate rests on each foot, 0 to 1.
     trust: PerFoot<f64>,
+    /// Base as the last tick's command has it.
+    pub base_commanded: Pose<World, Base>,
     /// Of the hands' references in the last command.
     hand_centre: Option<HandCentre>,
     /// Steps taken.
@@ -50,8 +52,8 @@ pub(crate) struct Felt {
     pub com: Vector2<f64>,
     /// Its velocity \[m/s\].
     pub com_velocity: Vector2<f64>,
-    /// Soles.
-    pub soles: PerFoot<Pose<World, Foot>>,
+    /// Base.
+    pub base: Pose<World, Base>,
     /// Wrench of the ground on each foot, at the foot's origin.
     pub ground_wrench: PerFoot<Wrench<World>>,
     /// What the hands carry.
@@ -87,12 +89,13 @@ pub(crate) struct LegTargets {
 }
 
 impl Legs {
-    /// Of robot `index` of this run, which stands as `kinematics` says; and their state at tick 0.
+    /// Of robot `index` of this run, which stands as `kinematics` says with its base at `X_WB`; and their state at tick 0.
     pub(crate) fn new(
         run: &RunSpec,
         index: usize,
         robot: &Robot,
         kinematics: &Kinematics,
+        X_WB: &Pose<World, Base>,
     ) -> Result<(Self, LegsState), BuildRobotError> {
         let scenario = &run.scenario;
         let period_s = scenario.control_period_s;
@@ -123,6 +126,7 @@ impl Legs {
             stabiliser: StabiliserState::default(),
             sole_correction: PerFoot { right: Twist::zero(), left: Twist::zero() },
             trust: PerFoot { right: 1.0, left: 1.0 },
+            base_commanded: *X_WB,
             hand_centre: None,
             steps: 0,
         };
@@ -237,7 +241,9 @@ impl Legs {
             let (was, is) = (&now.feet[side], &next.feet[side]);
             let correction = &mut state.sole_correction[side];
             if !is.in_contact {
-                self.sole_tracking.follow(correction, &was.pose, &felt.soles[side], self.period_s);
+                let foot = was.pose.translation;
+                let (measured, commanded) = (&felt.base, &state.base_commanded);
+                self.sole_tracking.follow(correction, &foot, measured, commanded, self.period_s);
             } else {
                 *correction += is.pose.displacement_to(&was.pose);
                 self.sole_tracking.fade(correction, self.period_s);

@@ -85,8 +85,7 @@ impl Servo {
         for (array, &palm) in hand_pose_commanded.iter_mut().zip(&robot.palms) {
             *array = kinematics.frame_pose::<Hand>(&robot.model, palm).to_array();
         }
-        let (legs, legs_state) = Legs::new(run, index, &robot, &kinematics)?;
-        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(&robot.model, robot.soles[side]));
+        let (legs, legs_state) = Legs::new(run, index, &robot, &kinematics, &X_WB)?;
         let initial = ServoState {
             ik: IkState::at_rest(&spec.initial_posture_rad),
             base: robot.base_estimator.start(&robot.model, &X_WB, &spec.initial_posture_rad),
@@ -94,7 +93,7 @@ impl Servo {
             felt: Felt {
                 com: kinematics.com().xy(),
                 com_velocity: Vector2::zeros(),
-                soles,
+                base: X_WB,
                 ground_wrench: PerFoot { right: Wrench::zero(), left: Wrench::zero() },
                 load: ExternalLoad::NONE,
             },
@@ -215,8 +214,7 @@ impl Servo {
         out.zmp_position_m = zmp.into();
         out.zmp_margin_m = support.signed_distance(&zmp);
         out.capture_point_margin_m = support.signed_distance(&capture_point);
-        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(model, robot.soles[side]));
-        Felt { com: com.xy(), com_velocity, soles, ground_wrench, load }
+        Felt { com: com.xy(), com_velocity, base: base.pose, ground_wrench, load }
     }
 
     /// Where the robot goes.
@@ -279,6 +277,7 @@ impl Servo {
         for (array, pose) in state.hand_pose_commanded.iter_mut().zip(&report.hand_poses) {
             *array = pose.to_array();
         }
+        state.legs.base_commanded = report.base_pose;
         state.hand_error_max_m = report.hand_error_m.iter().copied().fold(0.0, f64::max);
         state.joint_margin_rad = report.joint_margin;
         state.flags = set(flag::JOINT_LIMIT, report.at_position_limit != 0)

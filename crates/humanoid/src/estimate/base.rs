@@ -9,11 +9,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// Estimator of the base's pose: a complementary filter for the attitude, and the stance feet for the
 /// position.
 ///
-/// The gyroscope carries the attitude from tick to tick. The accelerometer, less the acceleration that
-/// the stance feet see, pulls its tilt slowly to where "up" is; the feet pull its yaw to theirs. What
-/// they pull against persistently is the gyroscope's bias. (Mahony et al., "Nonlinear complementary
-/// filters on the special orthogonal group", 2008, with the yaw of the feet in place of a compass. The
-/// acceleration is a difference of velocities, so over time its noise cancels in the filter.)
+/// The gyroscope carries the attitude from tick to tick, and the accelerometer, turned by it, the IMU's
+/// velocity. Where that leaves the velocity that the stance feet see, gravity was taken for acceleration:
+/// the attitude is tilted. With the difference e, and z up,
+/// - `dv/dt = R f − g z + 4 k e`
+/// - `ω_correction = (4 k² / g) z × e`, a critically damped loop of rate 2 k.
+///
+/// The feet pull the yaw to theirs. What they pull against persistently is the gyroscope's bias. (Velocity-
+/// aided attitude: Hua, "Attitude estimation for accelerated vehicles using GPS/INS measurements", 2010;
+/// Mahony et al., "Nonlinear complementary filters on the special orthogonal group", 2008. No reading is
+/// differentiated, and none is dropped: noise averages out.)
 ///
 /// Soles rest on the ground through soft contact, so they say where the base is, but not how it is
 /// tilted: encoders alone would take the sole's tilt for the base's.
@@ -32,20 +37,17 @@ pub struct BaseEstimator {
 /// Gains of [`BaseEstimator`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseEstimatorGains {
-    /// Rate at which the tilt follows the accelerometer \[1/s\].
+    /// k: half the rate at which the tilt follows the accelerometer \[1/s\].
     pub tilt_1_s: f64,
     /// Rate at which the yaw follows the feet \[1/s\].
     pub yaw_1_s: f64,
     /// Rate at which corrections become bias of the gyroscope \[1/s\].
     pub bias_1_s: f64,
-    /// Readings of the accelerometer that leave another size than gravity's by more say nothing
-    /// \[m/s²\].
-    pub gravity_tolerance_m_s2: f64,
 }
 
 impl Default for BaseEstimatorGains {
     fn default() -> Self {
-        Self { tilt_1_s: 0.3, yaw_1_s: 5.0, bias_1_s: 0.1, gravity_tolerance_m_s2: 1.0 }
+        Self { tilt_1_s: 1.0, yaw_1_s: 5.0, bias_1_s: 0.1 }
     }
 }
 
@@ -58,8 +60,7 @@ pub struct BaseEstimatorState {
     pub gyro_bias: Vector3<f64>,
     /// Origin of the root link in the world \[m\], for when no foot stands.
     pub base_position: Vector3<f64>,
-    /// Velocity of the IMU in the world \[m/s\], as the feet saw it in the last tick; `None` while no
-    /// foot stood.
+    /// Velocity of the IMU in the world by its accelerometer \[m/s\]; `None` before feet have told it once.
     pub imu_velocity: Option<Vector3<f64>>,
 }
 
@@ -149,17 +150,13 @@ impl BaseEstimator {
         let twist = Twist::new(linear[0] + linear[1], angular);
 
         // What the next tick begins with.
-        let imu_velocity = (total_weight > 0.0)
-            .then(|| kinematics.frame_twist(model, self.imu, &twist, readings.joint_velocity).linear);
-        let tilt_error = match (state.imu_velocity, imu_velocity) {
-            (Some(last), Some(now)) => {
-                let up = state.imu_attitude * readings.specific_force - (now - last) / self.period_s;
-                let size = up.norm();
-                let is_gravity = (size - GRAVITY_M_S2).abs() < gains.gravity_tolerance_m_s2;
-                if is_gravity { (up / size).cross(&Vector3::z()) } else { Vector3::zeros() }
-            }
-            _ => Vector3::zeros(),
-        };
+        let up = Vector3::z();
+        let by_feet = kinematics.frame_twist(model, self.imu, &twist, readings.joint_velocity).linear;
+        let velocity = state.imu_velocity.unwrap_or(by_feet);
+        let lag = if total_weight > 0.0 { by_feet - velocity } else { Vector3::zeros() };
+        let acceleration = state.imu_attitude * readings.specific_force - up * GRAVITY_M_S2;
+        state.imu_velocity = Some(velocity + (acceleration + lag * (4.0 * gains.tilt_1_s)) * self.period_s);
+        let tilt_error = up.cross(&lag) * (4.0 * gains.tilt_1_s / GRAVITY_M_S2);
         let yaw_error = Side::BOTH.map(|side| {
             let by_foot = feet[side].pose.rotation * X_BS[side].rotation.inverse();
             weight(side) * log(&(by_foot * attitude.inverse())).z
@@ -169,7 +166,6 @@ impl BaseEstimator {
         state.gyro_bias -= state.imu_attitude.inverse() * correction * gains.bias_1_s;
         state.imu_attitude = exp(&correction) * state.imu_attitude;
         state.imu_attitude.renormalize();
-        state.imu_velocity = imu_velocity;
         BaseEstimate { pose, twist }
     }
 }
