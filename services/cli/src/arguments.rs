@@ -7,6 +7,7 @@ const EXAMPLES: &str = "\
 Examples:
   mikoshi run config/scenarios/hold.toml
   mikoshi run config/scenarios/hold.toml --seed 3 --set team=two --set object.mass_kg=10
+  mikoshi report runs/hold-0
   mikoshi plan config/scenarios/hold.toml
   mikoshi status
   mikoshi doctor --clean";
@@ -25,6 +26,18 @@ Exit status:
   3  a fault of the system: a process died or froze, no shared memory, no simulator
   130, 143  interrupted, terminated";
 
+const REPORT_EXAMPLES: &str = "\
+Examples:
+  mikoshi report runs/hold-0                  (runs/hold-0/report/index.html)
+  mikoshi report runs/hold-0 runs/hold-1      (runs/hold-0/report/against-hold-1/index.html)
+  mikoshi report runs/hold-0 --out /tmp/figures
+
+Draws figures 9, 12, 14, 15, 16 and 18 of the paper from what the run left, as SVG and PNG, and a page with
+them. Of two runs, the first is drawn solid and the second dashed. Figures that a run has no data for are
+left out, and the page says why.
+
+Exit status: 0 it is written, 2 the folder holds no run that can be read.";
+
 /// A team of humanoid robots carries one object.
 #[derive(Debug, Parser)]
 #[command(name = "mikoshi", version, after_help = EXAMPLES)]
@@ -40,6 +53,9 @@ pub enum Command {
     /// Run a scenario: one process per service, or all of them in one thread
     #[command(after_help = RUN_EXAMPLES)]
     Run(RunArguments),
+    /// Draw the paper's figures from a run's results, or from two runs laid over each other
+    #[command(after_help = REPORT_EXAMPLES)]
+    Report(ReportArguments),
     /// Show what a scenario comes to: arms, matrices, gains, schedule, limits
     Plan(PlanArguments),
     /// List the runs of this machine and their processes
@@ -79,6 +95,18 @@ pub struct RunArguments {
     /// No progress and no table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// `mikoshi report`.
+#[derive(Args, Debug)]
+pub struct ReportArguments {
+    /// The folder with a run's results
+    pub run: PathBuf,
+    /// Another run, to be laid over the first
+    pub other: Option<PathBuf>,
+    /// Where the report goes [default: a folder in the first run's]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// `mikoshi plan`.

@@ -1,8 +1,8 @@
 //! What observers must know of a run.
 
 use crate::failure::Failure;
-use crate::prepare::Prepared;
-use mikoshi_config::RobotSpec;
+use mikoshi_config::{RobotSpec, RunSpec};
+use mikoshi_cooperation::InternalForces;
 use mikoshi_observation::{ObservedJoint, ObservedRobot, ObservedRun};
 use mikoshi_robot::Robot;
 
@@ -10,8 +10,7 @@ use mikoshi_robot::Robot;
 ///
 /// # Errors
 /// A robot's URDF can't be read. It was read before, so this is a fault.
-pub fn observed_run(prepared: &Prepared) -> Result<ObservedRun, Failure> {
-    let (run, internal_forces) = (&prepared.run, prepared.law.internal_forces());
+pub fn observed_run(run: &RunSpec, internal_forces: &InternalForces) -> Result<ObservedRun, Failure> {
     let c = internal_forces.c();
     let names = internal_forces.names().iter().skip(1).cloned();
     Ok(ObservedRun {

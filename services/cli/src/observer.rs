@@ -30,7 +30,7 @@ impl RunObserver {
     pub fn new(prepared: &Prepared, out: &OutputDirectory, is_shown: bool) -> Result<Self, Failure> {
         let run = &prepared.run;
         Ok(Self {
-            figures: Figures::new(observed_run(prepared)?),
+            figures: Figures::new(observed_run(run, prepared.law.internal_forces())?),
             hash: LogHash::default(),
             log: LogWriter::create(&out.run_log(), run).map_err(Failure::fault)?,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, is_shown),

@@ -9,14 +9,16 @@ use std::path::{Path, PathBuf};
 /// Where runs go that nobody gave a place.
 const DEFAULT_PARENT: &str = "runs";
 /// Whatever a run leaves, by which a folder with results is recognised and cleared.
-const RESULTS: [&str; 6] = [RUN_LOG, SUMMARY, SCENARIO, ROBOTS, WORLD, SERVICE_LOGS];
-const RUN_LOG: &str = "run.mcap";
-const SUMMARY: &str = "summary.json";
+const RESULTS: [&str; 7] = [RUN_LOG, SUMMARY, SCENARIO, ROBOTS, WORLD, SERVICE_LOGS, REPORT];
+pub(crate) const RUN_LOG: &str = "run.mcap";
+pub(crate) const SUMMARY: &str = "summary.json";
 const SCENARIO: &str = "scenario.toml";
 /// Beside [`SCENARIO`], by its name.
 const ROBOTS: &str = "scenario.robots";
 const WORLD: &str = "world.xml";
 const SERVICE_LOGS: &str = "logs";
+/// What `mikoshi report` draws from the others.
+pub(crate) const REPORT: &str = "report";
 
 /// A folder that belongs to this run until it is dropped.
 #[derive(Debug)]

@@ -2,5 +2,6 @@
 
 pub mod doctor;
 pub mod plan;
+pub mod report;
 pub mod run;
 pub mod status;

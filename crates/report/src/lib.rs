@@ -1,0 +1,29 @@
+//! A run as the paper's figures, and a page with them.
+//!
+//! ```text
+//! Observation, tick by tick ──▶ RunData ──┐                  ┌──▶ FIGURE.svg, FIGURE.png
+//!                               Summary ──┴─▶ figures: scenes┴──▶ index.html
+//! ```
+//!
+//! A figure is first a *scene*: panels, axes and marks in the data's units, without a pixel. Every figure
+//! has a file that makes its scene of one run, or of two laid over each other; one renderer draws all
+//! scenes. What figures show is true; what control saw of it is at most a thin line.
+//!
+//! This crate knows no log file, no simulator and no control.
+
+#![allow(non_snake_case)]
+
+mod error;
+mod figures;
+mod page;
+mod render;
+mod run_data;
+mod scene;
+mod style;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use error::WriteReportError;
+pub use run_data::RunData;
+pub use write::{ReportedRun, write_report};
