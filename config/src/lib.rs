@@ -9,6 +9,8 @@
 //! config/teams/TEAM.toml ─────────┘               ├──▶ RunSpec: one file that every service reads
 //! config/robots/MODEL.toml, URDF ──▶ LoadedRobot ─┘
 //! ```
+//!
+//! `config/sweeps/NAME.toml` names a scenario and what lies over it in each of many runs.
 
 mod decode;
 mod document;
@@ -22,6 +24,7 @@ pub mod robot;
 pub mod run;
 mod save;
 pub mod scenario;
+pub mod sweep;
 mod validate;
 
 pub use error::{KeyError, LoadConfigError};
@@ -31,3 +34,4 @@ pub use robot::RobotConfig;
 pub use run::{DecodeRunError, RobotSpec, RunSpec};
 pub use save::{SaveScenarioError, save_scenario};
 pub use scenario::Scenario;
+pub use sweep::{LoadedSweep, Sweep, SweepRun, load_sweep};

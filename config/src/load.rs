@@ -62,10 +62,49 @@ pub fn load_scenario(
     overrides: &[(String, String)],
     seed: Option<u64>,
 ) -> Result<LoadedScenario, LoadConfigError> {
+    let edits = overrides.iter().map(|(key, value)| Edit::of_option(key, value)).collect();
+    load_with(path, edits, seed)
+}
+
+/// A value to be put in place of a scenario's.
+pub(crate) struct Edit {
+    key: String,
+    origin: Origin,
+    /// None takes the key away.
+    node: Option<Node>,
+}
+
+impl Edit {
+    /// Puts `node` at `key`; an empty string takes the key away.
+    pub fn new(key: &str, node: &Node) -> Self {
+        let takes_away = matches!(&node.value, Value::String(text) if text.is_empty());
+        let (origin, node) = (node.origin.clone(), Some(node.clone()).filter(|_| !takes_away));
+        Self { key: key.to_owned(), origin, node }
+    }
+
+    fn of_option(key: &str, value: &str) -> Self {
+        Self::new(key, &Node::from_option(&format!("--set {key}={value}"), value))
+    }
+
+    fn apply(self, document: &mut Node) -> Result<(), KeyError> {
+        match self.node {
+            Some(node) => document.set(&self.key, node),
+            None => document.unset(&self.key, self.origin),
+        }
+    }
+}
+
+/// The same with overrides from anywhere.
+pub(crate) fn load_with(
+    path: &Path,
+    edits: Vec<Edit>,
+    seed: Option<u64>,
+) -> Result<LoadedScenario, LoadConfigError> {
     let mut document = Node::read(path)?;
     // The team first: what lies beneath depends on it.
-    for (key, value) in overrides.iter().filter(|(key, _)| key == "team") {
-        apply(&mut document, key, value)?;
+    let (of_team, edits): (Vec<_>, Vec<_>) = edits.into_iter().partition(|edit| edit.key == "team");
+    for edit in of_team {
+        edit.apply(&mut document)?;
     }
     if let Some(Value::String(team)) = document.get("team").map(|node| &node.value) {
         let team =
@@ -74,8 +113,8 @@ pub fn load_scenario(
     } else if document.get("team").or(document.get("robots")).is_none() {
         return Err(document.key_error("team", "found nothing, expected a team, or robots here").into());
     }
-    for (key, value) in overrides.iter().filter(|(key, _)| key != "team") {
-        apply(&mut document, key, value)?;
+    for edit in edits {
+        edit.apply(&mut document)?;
     }
     if let Some(seed) = seed {
         let value = Value::Integer(seed.into());
@@ -133,16 +172,7 @@ fn load_models(
     Ok(models)
 }
 
-fn apply(document: &mut Node, key: &str, value: &str) -> Result<(), LoadConfigError> {
-    let typed = format!("--set {key}={value}");
-    match value {
-        "" => document.unset(key, Origin::Option(typed.into()))?,
-        _ => document.set(key, Node::from_option(&typed, value))?,
-    }
-    Ok(())
-}
-
-fn refuse(document: &Node, violations: Vec<Violation>) -> Result<(), LoadConfigError> {
+pub(crate) fn refuse(document: &Node, violations: Vec<Violation>) -> Result<(), LoadConfigError> {
     if violations.is_empty() {
         return Ok(());
     }
@@ -157,7 +187,7 @@ pub(crate) fn robots_beside(scenario: &Path) -> PathBuf {
 }
 
 /// The folder `name` beside the scenario's folder.
-fn sibling(scenario: &Path, name: &str) -> PathBuf {
+pub(crate) fn sibling(scenario: &Path, name: &str) -> PathBuf {
     let folder = scenario.parent().unwrap_or(Path::new(""));
     match folder.file_name() {
         Some(_) => folder.with_file_name(name),
@@ -166,7 +196,7 @@ fn sibling(scenario: &Path, name: &str) -> PathBuf {
 }
 
 /// `DIR/NAME.toml`, or what is wrong with the name.
-fn find(dir: &Path, name: &str) -> Result<PathBuf, String> {
+pub(crate) fn find(dir: &Path, name: &str) -> Result<PathBuf, String> {
     let known = names_in(dir);
     if known.iter().any(|known| known == name) {
         return Ok(dir.join(format!("{name}.toml")));

@@ -3,7 +3,9 @@
 mod checks;
 mod robot;
 mod scenario;
+mod sweep;
 
 pub(crate) use checks::Violation;
 pub(crate) use robot::robot;
 pub(crate) use scenario::{grasping_hands, scenario};
+pub(crate) use sweep::sweep;

@@ -93,3 +93,14 @@ fn hold_is_the_papers_section_4_3() {
     assert_eq!(scenario.object.size_m, [0.6, 1.6, 0.3]);
     assert_eq!(scenario.grasp, Grasp::Weld { offset_m: 0.002 });
 }
+
+#[test]
+fn every_sweep_is_called_as_its_file_and_can_be_run() {
+    for name in names_in("sweeps") {
+        let path = folder("sweeps").join(&name).with_extension("toml");
+        let loaded = mikoshi_config::load_sweep(&path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(loaded.sweep.name, name);
+        let scenario = load_scenario(&loaded.scenario, &loaded.runs(1)[0].overrides, None);
+        scenario.unwrap_or_else(|error| panic!("{error}"));
+    }
+}

@@ -25,7 +25,7 @@ impl Copy {
     /// Of all scenarios, teams and robots.
     pub fn new() -> Self {
         let copy = Self { folder: tempfile::tempdir().expect("a folder") };
-        for part in ["scenarios", "teams", "robots"] {
+        for part in ["scenarios", "sweeps", "teams", "robots"] {
             let (from, to) = (workspace().join("config").join(part), copy.path(part));
             fs::create_dir(&to).expect("a new folder");
             for entry in fs::read_dir(from).expect("it is there").flatten() {

@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use clap::{Args, Parser, Subcommand};
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -8,6 +9,7 @@ Examples:
   mikoshi run config/scenarios/hold.toml
   mikoshi run config/scenarios/hold.toml --seed 3 --set team=two --set object.mass_kg=10
   mikoshi report runs/hold-0
+  mikoshi sweep config/sweeps/robust.toml
   mikoshi plan config/scenarios/hold.toml
   mikoshi status
   mikoshi doctor --clean";
@@ -38,6 +40,19 @@ left out, and the page says why.
 
 Exit status: 0 it is written, 2 the folder holds no run that can be read.";
 
+const SWEEP_EXAMPLES: &str = "\
+Examples:
+  mikoshi sweep config/sweeps/robust.toml
+  mikoshi sweep config/sweeps/robust.toml --runs 6 --out /tmp/robust
+  mikoshi sweep config/sweeps/robust.toml --out /tmp/robust     (goes on where the above has ended)
+
+Exit status:
+  0  at least as many runs succeeded as the file asks for; of fewer --runs, as large a share
+  1  they did not
+  2  bad usage or configuration
+  3  a fault of the system: a run without a result, no simulator
+  130, 143  interrupted, terminated: finished runs stay";
+
 /// A team of humanoid robots carries one object.
 #[derive(Debug, Parser)]
 #[command(name = "mikoshi", version, after_help = EXAMPLES)]
@@ -56,6 +71,9 @@ pub enum Command {
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
+    /// Run a scenario many times, by seed over ranges of parameters; finished runs are not done again
+    #[command(after_help = SWEEP_EXAMPLES)]
+    Sweep(SweepArguments),
     /// Show what a scenario comes to: arms, matrices, gains, schedule, limits
     Plan(PlanArguments),
     /// List the runs of this machine and their processes
@@ -107,6 +125,31 @@ pub struct ReportArguments {
     /// Where the report goes [default: a folder in the first run's]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// `mikoshi sweep`.
+#[derive(Args, Debug)]
+pub struct SweepArguments {
+    /// The sweep's file, such as config/sweeps/robust.toml
+    pub sweep: PathBuf,
+    /// Where the results go, and where those of an earlier sweep are found [default: runs/sweep-NAME]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Runs at once [default: as many as there are cores]
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<NonZeroUsize>,
+    /// Number of runs, in place of the file's
+    #[arg(long, value_name = "N")]
+    pub runs: Option<NonZeroU32>,
+    /// Keep every frame of every run, about 3 MB for each second
+    #[arg(long)]
+    pub keep_logs: bool,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// No progress and no table: errors and exit status only
+    #[arg(long, short, conflicts_with = "json")]
+    pub quiet: bool,
 }
 
 /// `mikoshi plan`.

@@ -151,7 +151,8 @@ impl ServiceProcess {
     }
 }
 
-fn start(mut command: Command, log: &Path) -> io::Result<Child> {
+/// Starts a process whose every word goes to a file, and which dies with the thread that calls this.
+pub(crate) fn start(mut command: Command, log: &Path) -> io::Result<Child> {
     let log = File::create(log)?;
     command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
     // A Ctrl-C at the terminal is for the supervisor, who ends all in order.

@@ -1,4 +1,4 @@
-//! The mikoshi command: run, report, plan, status, doctor.
+//! The mikoshi command: run, report, sweep, plan, status, doctor.
 //!
 //! Two programs share this library: `mikoshi`, which runs a scenario as one process per service, and
 //! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process` becomes.
@@ -24,6 +24,7 @@ mod progress;
 mod report;
 mod standstill;
 mod supervisor;
+mod sweep;
 mod table;
 mod wall_clock;
 
@@ -42,6 +43,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Run(arguments) if arguments.in_process => become_in_process(),
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
+        Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),
         Command::Status(arguments) => commands::status::status(arguments).map(|()| Status::Met),
         Command::Doctor(arguments) => commands::doctor::doctor(arguments),

@@ -5,3 +5,4 @@ pub mod plan;
 pub mod report;
 pub mod run;
 pub mod status;
+pub mod sweep;

@@ -1,0 +1,164 @@
+//! Sweeps: what each run draws, and what is refused before any runs.
+
+use mikoshi_config::{LoadedSweep, load_scenario, load_sweep};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const GOOD: &str = r#"name = "lifts"
+description = "Lifts of many masses"
+scenario = "lift"
+runs = 10
+first_seed = 3
+succeed_min = 9
+[set]
+hybrid.kz = 0.1
+hybrid.start_s = ""
+physics = { friction = 0.5 }
+[[ranges]]
+key = "object.mass_kg"
+min = 1
+max = 6
+[[ranges]]
+key = "sensors.delay_ticks"
+min = 0
+max = 4
+whole = true
+"#;
+
+/// The fixture with a sweep of this text.
+fn fixture(text: &str) -> (TempDir, PathBuf) {
+    let (copy, original) =
+        (TempDir::new().unwrap(), Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixture"));
+    for folder in ["scenarios", "teams", "robots"] {
+        fs::create_dir(copy.path().join(folder)).unwrap();
+        for entry in fs::read_dir(original.join(folder)).unwrap() {
+            let name = Path::new(folder).join(entry.unwrap().file_name());
+            fs::copy(original.join(&name), copy.path().join(&name)).unwrap();
+        }
+    }
+    fs::create_dir(copy.path().join("sweeps")).unwrap();
+    let path = copy.path().join("sweeps/lifts.toml");
+    fs::write(&path, text).unwrap();
+    (copy, path)
+}
+
+fn load(text: &str) -> LoadedSweep {
+    let (_copy, path) = fixture(text);
+    load_sweep(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The text for the good sweep with `good` replaced by `bad`.
+#[track_caller]
+fn gives(good: &str, bad: &str, expected: &str) {
+    assert_eq!(GOOD.matches(good).count(), 1, "{good:?} is to be found once");
+    let (copy, path) = fixture(&GOOD.replace(good, bad));
+    let error = load_sweep(&path).err().expect("the input is bad").to_string();
+    assert_eq!(error.replace(&format!("{}/", copy.path().display()), ""), expected);
+}
+
+#[test]
+fn runs_lie_within_their_ranges_whose_whole_numbers_all_occur() {
+    let runs = load(GOOD).runs(200);
+    let masses: Vec<f64> = runs.iter().map(|run| run.parameters[0].1).collect();
+    assert!(masses.iter().all(|mass| (1.0..=6.0).contains(mass)));
+    let mean = masses.iter().sum::<f64>() / 200.0;
+    assert!((mean - 3.5).abs() < 0.3, "{mean}");
+    for ticks in 0..=4 {
+        let count = runs.iter().filter(|run| run.parameters[1].1 == f64::from(ticks)).count();
+        assert!((20..=60).contains(&count), "{ticks}: {count}");
+    }
+}
+
+#[test]
+fn a_run_draws_by_its_seed_and_key_whatever_else_is_drawn() {
+    let all = load(GOOD).runs(10);
+    assert_eq!(all.iter().map(|run| run.seed).collect::<Vec<_>>(), (3..13).collect::<Vec<u64>>());
+    let without_mass = GOOD.replace("[[ranges]]\nkey = \"object.mass_kg\"\nmin = 1\nmax = 6\n", "");
+    let later = load(&without_mass.replace("first_seed = 3", "first_seed = 8")).runs(2);
+    assert_eq!(later[0].parameters[0], all[5].parameters[1]);
+    assert_ne!(all[0].parameters, all[1].parameters);
+}
+
+#[test]
+fn overrides_make_the_scenario_that_the_sweep_describes() {
+    let (_copy, path) = fixture(GOOD);
+    let loaded = load_sweep(&path).unwrap();
+    let run = &loaded.runs(1)[0];
+    let scenario = load_scenario(&loaded.scenario, &run.overrides, Some(run.seed)).unwrap().scenario;
+    assert_eq!((scenario.seed, scenario.hybrid.kz, scenario.physics.friction), (3, 0.1, 0.5));
+    assert_eq!(scenario.hybrid.start_s, None, "an empty string takes a key away");
+    assert_eq!(scenario.object.mass_kg, run.parameters[0].1, "to the last bit");
+    assert_eq!(scenario.sensors.delay_ticks as f64, run.parameters[1].1);
+}
+
+#[test]
+fn unknown_keys_of_a_sweep_are_refused() {
+    gives("runs = 10", "rums = 10", "sweeps/lifts.toml:4: rums: unknown key; did you mean \"runs\"?");
+    gives("max = 6", "mix = 6", "sweeps/lifts.toml:14: ranges.0.mix: unknown key; did you mean \"min\"?");
+    gives("runs = 10", "runs = -1", "sweeps/lifts.toml:4: runs: found -1, expected a whole number from 0");
+}
+
+#[test]
+fn what_the_scenario_does_not_know_is_refused_where_the_sweep_says_it() {
+    gives(
+        "object.mass_kg",
+        "object.mas_kg",
+        "sweeps/lifts.toml:12: object.mas_kg: unknown key; did you mean \"mass_kg\"?",
+    );
+    gives(
+        "kz = 0.1",
+        "kz = 2",
+        "sweeps/lifts.toml:8: hybrid.kz: found 2, expected a number above 0, up to 1",
+    );
+    gives(
+        "\"lift\"",
+        "\"left\"",
+        "sweeps/lifts.toml:3: scenario: found \"left\", expected one of lift in scenarios; did you mean \"lift\"?",
+    );
+}
+
+#[test]
+fn a_range_with_an_end_that_can_not_be_run_is_refused() {
+    gives(
+        "min = 1",
+        "min = 0",
+        "sweeps/lifts.toml:13: object.mass_kg: found 0, expected a finite number above 0",
+    );
+    gives(
+        "max = 4",
+        "max = 1001",
+        "sweeps/lifts.toml:18: sensors.delay_ticks: found 1001, expected at most 1000 ticks",
+    );
+    gives(
+        "max = 4\nwhole = true",
+        "max = 4",
+        "sweeps/lifts.toml:16: sensors.delay_ticks: found 2.5844566117449546, expected a whole number from 0",
+    );
+}
+
+#[test]
+fn ranges_that_make_no_sense_are_refused() {
+    gives("max = 6", "max = 0.5", "sweeps/lifts.toml:14: ranges.0.max: found 0.5, expected at least min (1)");
+    gives("max = 4", "max = 4.5", "sweeps/lifts.toml:18: ranges.1.max: found 4.5, expected a whole number");
+    gives(
+        "object.mass_kg",
+        "sensors.delay_ticks",
+        "sweeps/lifts.toml:16: ranges.1.key: found \"sensors.delay_ticks\" again, expected each name once",
+    );
+    gives(
+        "object.mass_kg",
+        "hybrid.kz",
+        "sweeps/lifts.toml:12: ranges.0.key: found \"hybrid.kz\", expected a key that is not in [set]",
+    );
+    gives(
+        "kz = 0.1",
+        "kz = 0.1\nseed = 4",
+        "sweeps/lifts.toml:9: set.seed: found a value, expected a key that does not tell runs apart: first_seed does",
+    );
+    gives(
+        "= 9",
+        "= 11",
+        "sweeps/lifts.toml:6: succeed_min: found 11, expected no more than all of the 10 runs",
+    );
+}

@@ -1,0 +1,78 @@
+//! What a sweep came to, for people.
+
+use super::result::{Figures, Row, SweepResult};
+use crate::table;
+use core::fmt::Write as _;
+use std::path::Path;
+
+/// The whole report.
+pub fn report(result: &SweepResult, out: &Path) -> String {
+    let mut text = table::of_numbers(
+        &["figure", "median", "worst"],
+        figures(&result.median).into_iter().zip(figures(&result.worst)).map(
+            |((name, median), (_, worst))| {
+                vec![name.to_owned(), format!("{median:.2}"), format!("{worst:.2}")]
+            },
+        ),
+    );
+    let failed: Vec<_> = result.runs.iter().filter(|row| !row.passed).collect();
+    if !failed.is_empty() {
+        text += "\nRuns that failed\n";
+    }
+    for row in failed {
+        text += &failure(result, row);
+    }
+    // Writing to a string can't fail.
+    let _ = writeln!(text, "\nresults in {}", out.display());
+    let _ = writeln!(
+        text,
+        "{}: {} of {} runs of {} succeeded, expected at least {}",
+        if result.passed { "passed" } else { "NOT passed" },
+        result.succeeded,
+        result.runs.len(),
+        result.scenario,
+        result.succeed_min
+    );
+    text
+}
+
+/// What is printed of all figures.
+fn figures(figures: &Figures) -> [(&'static str, f64); 8] {
+    [
+        ("position peak mm", 1e3 * figures.position_peak_m),
+        ("position RMS mm", 1e3 * figures.position_rms_m),
+        ("attitude RMS mrad", 1e3 * figures.attitude_rms_rad),
+        ("ZMP margin mm", 1e3 * figures.zmp_margin_min_m),
+        ("slip mm", 1e3 * figures.foot_slip_max_m),
+        ("internal peak N", figures.internal_peak_n),
+        ("internal end N", figures.internal_end_n),
+        ("internal end Nm", figures.internal_end_nm),
+    ]
+}
+
+/// A run's causes, and what was drawn for it.
+fn failure(result: &SweepResult, row: &Row) -> String {
+    let mut text = format!("  run {}, seed {}\n", row.run, row.seed);
+    for cause in &row.failures {
+        let _ = writeln!(text, "    {cause}");
+    }
+    let drawn = result.parameters.iter().filter_map(|key| {
+        // The last part of a key tells enough, and three digits.
+        let name = key.rsplit('.').next().unwrap_or(key);
+        row.parameters.get(key).map(|value| format!("{name} {}", three_digits(*value)))
+    });
+    let drawn: Vec<_> = drawn.collect();
+    if !drawn.is_empty() {
+        let _ = writeln!(text, "    with {}", drawn.join(", "));
+    }
+    text
+}
+
+fn three_digits(value: f64) -> String {
+    let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let text = format!("{value:.*}", (2.0 - digits).clamp(0.0, 12.0) as usize);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
