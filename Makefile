@@ -17,8 +17,8 @@ setup: ## Fetch MuJoCo's library (once) into .mujoco/run-make-setup
 build: setup ## Build target/release/mikoshi and the services beside it
 	$(CARGO) build --release --workspace --bins
 
-demo: build ## Four robots hold one object while the internal forces go to zero
-	$(RELEASE)/mikoshi run config/scenarios/hold.toml
+demo: build ## Four robots walk and carry one object
+	$(RELEASE)/mikoshi run config/scenarios/transport.toml
 
 test: build ## Run every test
 	$(CARGO) test --release --workspace

@@ -12,6 +12,7 @@
 //!
 //! `config/sweeps/NAME.toml` names a scenario and what lies over it in each of many runs.
 
+mod coordination;
 mod decode;
 mod document;
 mod error;

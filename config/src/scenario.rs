@@ -1,5 +1,6 @@
 //! A scenario: what a team does, with what, for how long, and when that counts as success.
 
+pub use crate::coordination::{Coordination, Policy};
 pub use crate::grasp::Grasp;
 pub use crate::motion::{Motion, RandomMotion, Segment};
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,9 @@ pub struct Scenario {
     pub grasp: Grasp,
     /// The hybrid law.
     pub hybrid: Hybrid,
+    /// Who decides where the hands go.
+    #[serde(default)]
+    pub coordination: Coordination,
     /// How the object is asked to move; it stays when absent.
     #[serde(default)]
     pub motion: Option<Motion>,

@@ -44,6 +44,15 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     grasp(&mut checks, &scenario.grasp);
     let arms = team(&mut checks, &scenario.robots, configs);
     hybrid(&mut checks, scenario, arms);
+    let coordination = &scenario.coordination;
+    checks.positive("coordination.detection_n", coordination.detection_n);
+    checks.not_negative("coordination.delay_s", coordination.delay_s);
+    if let Some(leader) = &coordination.leader {
+        let names: Vec<_> = scenario.robots.iter().map(|member| member.name.as_str()).collect();
+        let expected = format!("a robot of the team: {}", names.join(", "));
+        let is_known = names.contains(&leader.as_str());
+        checks.require(is_known, "coordination.leader", format_args!("{leader:?}"), expected);
+    }
     if let Some(of_object) = &scenario.motion {
         motion(&mut checks, of_object, scenario);
     }

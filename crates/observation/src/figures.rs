@@ -14,6 +14,8 @@ const JUDGED_AFTER_S: f64 = 3.0;
 const WINDOW_S: f64 = 0.2;
 /// Length of the window in which measured and true internal forces are compared.
 const COMPARED_S: f64 = 1.0;
+/// A zero moment point this near to the edge of the support is at the edge.
+const EDGE_M: f64 = 0.005;
 /// A drift is not divided by less.
 const LEAST_WALK_M: f64 = 0.1;
 
@@ -114,6 +116,7 @@ impl Figures {
         let seen = observation.robot_truth.iter().zip(&observation.robot_state);
         for (figures, (truth, state)) in self.robots.iter_mut().zip(seen) {
             figures.observe(&truth.payload, &state.payload);
+            figures.note_edge(observation.tick(), &truth.payload);
         }
         if observation.object_truth.payload.unintended_contacts > 0 {
             self.unintended_contact_ticks += 1;
@@ -179,7 +182,7 @@ impl Figures {
             internal_measurement_error_n: self.measurement_error.0,
             internal_measurement_error_nm: self.measurement_error.1,
             fell: robots.clone().filter(|(_, f)| f.has_fallen).map(|(robot, _)| robot.name.clone()).collect(),
-            robots: robots.map(|(robot, figures)| figures.finish(robot)).collect(),
+            robots: robots.map(|(robot, figures)| figures.finish(robot, self.run.control_period_s)).collect(),
             drift_between_robots_m,
             unintended_contact_ticks: self.unintended_contact_ticks,
         }
@@ -241,6 +244,7 @@ struct RobotFigures {
     /// Base's estimate minus truth at tick 0 and last.
     base_error_m: Option<(Vector2<f64>, Vector2<f64>)>,
     zmp_margin_min_m: f64,
+    edge_tick: Option<u64>,
     foot_slip_max_m: f64,
     tilt_max_rad: f64,
     steps: u64,
@@ -259,6 +263,7 @@ impl RobotFigures {
             walked_m: 0.0,
             base_error_m: None,
             zmp_margin_min_m: f64::INFINITY,
+            edge_tick: None,
             foot_slip_max_m: 0.0,
             tilt_max_rad: 0.0,
             steps: 0,
@@ -296,12 +301,18 @@ impl RobotFigures {
         self.base_error_m = Some((self.base_error_m.map_or(error, |(first, _)| first), error));
     }
 
+    fn note_edge(&mut self, tick: u64, truth: &RobotTruth) {
+        if truth.zmp_margin_m < EDGE_M {
+            self.edge_tick.get_or_insert(tick);
+        }
+    }
+
     /// How far the base's estimate has moved against the truth.
     fn drift_m(&self) -> Vector2<f64> {
         self.base_error_m.map_or_else(Vector2::zeros, |(first, last)| last - first)
     }
 
-    fn finish(&self, robot: &ObservedRobot) -> RobotSummary {
+    fn finish(&self, robot: &ObservedRobot, control_period_s: f64) -> RobotSummary {
         let by_name = |value: &dyn Fn(usize, &ObservedJoint) -> f64| -> BTreeMap<String, f64> {
             robot.joints.iter().enumerate().map(|(i, joint)| (joint.name.clone(), value(i, joint))).collect()
         };
@@ -309,6 +320,7 @@ impl RobotFigures {
         RobotSummary {
             name: robot.name.clone(),
             zmp_margin_min_m: self.zmp_margin_min_m,
+            zmp_edge_s: self.edge_tick.map(|tick| tick as f64 * control_period_s),
             foot_slip_max_m: self.foot_slip_max_m,
             tilt_max_rad: self.tilt_max_rad,
             steps: self.steps,

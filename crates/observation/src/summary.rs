@@ -82,6 +82,8 @@ pub struct InternalSummary {
 pub struct RobotSummary {
     pub name: String,
     pub zmp_margin_min_m: f64,
+    /// When its zero moment point first came within 5 mm of the edge.
+    pub zmp_edge_s: Option<f64>,
     /// Largest horizontal displacement of a loaded sole since it was set down.
     pub foot_slip_max_m: f64,
     pub tilt_max_rad: f64,

@@ -21,6 +21,7 @@ pub mod output_directory;
 pub mod prepare;
 pub mod print;
 mod progress;
+mod pull;
 mod report;
 mod standstill;
 mod supervisor;

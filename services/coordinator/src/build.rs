@@ -27,6 +27,8 @@ pub enum BuildCoordinatorError {
     Grasp(#[from] StartHybridError),
     #[error("hybrid.axes: there is no row `{found}`; expected one of {expected}")]
     UnknownRow { found: String, expected: String },
+    #[error("coordination.leader: there is no robot `{found}`; expected one of {expected}")]
+    UnknownLeader { found: String, expected: String },
     #[error("robot {robot}, hand {hand}: its pose in the object is not a pose")]
     HandPose { robot: String, hand: usize },
     #[error("{0}")]

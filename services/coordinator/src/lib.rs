@@ -9,6 +9,7 @@
 
 mod build;
 mod grasp;
+mod leading;
 mod object_motion;
 mod participant;
 mod reference;

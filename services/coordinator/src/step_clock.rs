@@ -53,6 +53,15 @@ impl Wishes {
         all
     }
 
+    /// Of one robot alone.
+    pub(crate) fn of_robot(&self, robot: usize) -> Self {
+        let mut one = Self { wishes: [StepWish::CONTENT; MAX_ROBOTS], robots: 1, ..*self };
+        if let (Some(slot), Some(wish)) = (one.wishes.first_mut(), self.wishes.get(robot)) {
+            *slot = *wish;
+        }
+        one
+    }
+
     fn as_slice(&self) -> &[StepWish] {
         self.wishes.get(..self.robots).unwrap_or(&self.wishes)
     }

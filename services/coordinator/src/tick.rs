@@ -2,6 +2,7 @@
 
 use crate::build::{BuildCoordinatorError, build_hybrid_law, virtual_sticks};
 use crate::grasp::GraspCompliance;
+use crate::leading::{Leading, LeadingState};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::reference::References;
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
@@ -21,6 +22,8 @@ pub struct Coordinator {
     law: HybridLaw,
     references: References,
     compliance: GraspCompliance,
+    /// One robot leads; absent where the team is coordinated by symmetry.
+    leading: Option<Leading>,
     motion: ObjectMotion,
     timing: StepTiming,
     /// Tick at which the object is first asked to move; it never is when absent.
@@ -39,6 +42,8 @@ pub struct CoordinatorState {
     /// The object's reference, from where the virtual sticks saw it when the hybrid law started.
     motion: ObjectMotionState,
     clock: TeamClockState,
+    /// Where one robot leads.
+    leading: LeadingState,
     /// What each hand applies to the object, filtered.
     hand_wrench: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// Generalized force then, row by row.
@@ -105,6 +110,7 @@ impl Coordinator {
             law,
             references,
             compliance: GraspCompliance::new(scenario),
+            leading: Leading::new(run)?,
             motion: ObjectMotion::new(run),
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
@@ -123,6 +129,7 @@ impl Coordinator {
             hybrid: HybridState::at_grasp(&self.sticks)?,
             motion: ObjectMotionState::at_rest(&Pose::identity()),
             clock: TeamClockState::default(),
+            leading: LeadingState::at_start(None, &Pose::identity(), &[]),
             hand_wrench: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             team_mode: mode::HOLD,
@@ -167,7 +174,9 @@ impl Coordinator {
 
         let ticks_since_start = tick.saturating_sub(self.hybrid_start_tick.unwrap_or(tick));
         self.references.fill(ticks_since_start, &X_WA_ref, &state.force_at_start, force_ref, position_ref);
-        let reference = is_hybrid.then_some(HybridReference {
+        // A leader's team has no hybrid law: hands are where leader and followers have them.
+        let is_led = is_hybrid && self.leading.is_some();
+        let reference = (is_hybrid && !is_led).then_some(HybridReference {
             force: force_ref,
             position: position_ref,
             object_twist: motion.twist(),
@@ -176,6 +185,13 @@ impl Coordinator {
         self.law
             .act(&mut state.hybrid, law_scratch, &inputs, law_output)
             .map_err(|_| CoordinateError::Law)?;
+        if let Some(leading) = self.leading.as_ref().filter(|_| is_led) {
+            let object = (&X_WA_ref, &motion.twist());
+            leading
+                .act(&mut state.leading, object, hands, &mut law_output.hands)
+                .and_then(|()| leading.advance_clocks(&mut state.leading, &self.timing, &wishes))
+                .ok_or(CoordinateError::State)?;
+        }
         (state.motion, state.clock, state.hand_wrench) = (motion, clock, hand_wrench);
 
         self.write_commands(tick, state, law_output, out);
@@ -220,6 +236,7 @@ impl Coordinator {
             *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
         }
         state.motion = ObjectMotionState::at_rest(X_WA);
+        state.leading = LeadingState::at_start(self.leading.as_ref(), X_WA, hands);
         write_force(&law.force, &mut state.force_at_start);
         state.team_mode = mode::CARRY;
     }
@@ -232,11 +249,13 @@ impl Coordinator {
         out: &mut CoordinatorOutputs,
     ) {
         let mut references = law.hands.iter();
-        for (command, &hands) in out.commands.iter_mut().zip(&self.hands_of_robots) {
+        let robots = self.hands_of_robots.iter().zip(&state.leading.clocks);
+        for (command, (&hands, own_clock)) in out.commands.iter_mut().zip(robots) {
+            let clock = if self.leading.is_some() { own_clock } else { &state.clock };
             *command = TeamCommand {
                 team_mode: state.team_mode,
                 state_tick: tick,
-                step_clock: state.clock.clock,
+                step_clock: clock.clock,
                 closed_hands: (1 << hands.min(MAX_HANDS)) - 1,
                 ..TeamCommand::zeroed()
             };

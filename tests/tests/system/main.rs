@@ -4,4 +4,5 @@ mod bad_input;
 mod command;
 mod determinism;
 mod faults;
+mod leader_follower;
 mod report;

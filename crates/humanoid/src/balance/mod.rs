@@ -7,11 +7,13 @@
 mod distribution;
 mod nearest;
 mod pendulum;
+mod pull;
 mod side;
 mod stabiliser;
 
 pub use distribution::{FootLoad, distribute};
 pub use nearest::nearest_in_polygon;
 pub use pendulum::{ExternalLoad, GRAVITY_M_S2, Pendulum};
+pub use pull::PulledRobot;
 pub use side::{PerFoot, Side};
 pub use stabiliser::{Stabilisation, Stabiliser, StabiliserConfig, StabiliserInputs, StabiliserState};

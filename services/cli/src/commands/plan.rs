@@ -6,6 +6,7 @@ use crate::fraction::Fraction;
 use crate::gain::GainReport;
 use crate::prepare::{Prepared, prepare};
 use crate::print::{print_error, print_out};
+use crate::pull::{Pull, pulls};
 use crate::table;
 use core::fmt::Write as _;
 use mikoshi_config::scenario::{Scenario, Thresholds};
@@ -20,7 +21,7 @@ use serde::Serialize;
 /// The scenario can't be run.
 pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     let prepared = prepare(&arguments.scenario)?;
-    let plan = Plan::of(&prepared);
+    let plan = Plan::of(&prepared)?;
     if arguments.json {
         let mut text = serde_json::to_string_pretty(&plan).map_err(Failure::fault)?;
         text.push('\n');
@@ -48,6 +49,7 @@ struct Plan<'a> {
     rows: Vec<Row<'a>>,
     matrices: Matrices,
     gains: GainReport,
+    pulls: Vec<Pull>,
     schedule: Vec<Phase>,
     shared_memory_bytes: u64,
     thresholds: &'a Thresholds,
@@ -92,10 +94,10 @@ struct Phase {
 }
 
 impl<'a> Plan<'a> {
-    fn of(prepared: &'a Prepared) -> Self {
+    fn of(prepared: &'a Prepared) -> Result<Self, Failure> {
         let (run, scenario) = (&prepared.run, &prepared.run.scenario);
         let internal_forces = prepared.law.internal_forces();
-        Self {
+        Ok(Self {
             scenario: &scenario.name,
             description: &scenario.description,
             seed: scenario.seed,
@@ -112,10 +114,11 @@ impl<'a> Plan<'a> {
                 u: by_row(&internal_forces.u()),
             },
             gains: GainReport::of(prepared),
+            pulls: pulls(run)?,
             schedule: schedule(prepared),
             shared_memory_bytes: required_bytes(&prepared.schedule),
             thresholds: &scenario.thresholds,
-        }
+        })
     }
 
     fn to_text(&self, prepared: &Prepared) -> String {
@@ -157,6 +160,11 @@ impl<'a> Plan<'a> {
 
         title(&mut text, "Loop gain");
         text += &self.gains_text();
+        title(
+            &mut text,
+            "Standing robots pulled by a leader of their kind (eq. 42): until the ZMP is at their toes",
+        );
+        text += &pulls_table(&self.pulls);
         title(&mut text, "Schedule of a tick");
         text += &prepared.schedule.to_string();
         title(&mut text, "Limits");
@@ -240,6 +248,21 @@ fn arms_table(arms: &[Arm<'_>]) -> String {
         vec![name, arm.model.to_owned(), format!("{x:.3}"), format!("{y:.3}"), format!("{z:.3}")]
     };
     table::of_numbers(&["arm", "model", "x [m]", "y [m]", "z [m]"], arms.iter().enumerate().map(cells))
+}
+
+fn pulls_table(pulls: &[Pull]) -> String {
+    let cells = |pull: &Pull| {
+        vec![
+            pull.robot.clone(),
+            format!("{:.0}", pull.stiffness_n_m),
+            format!("{:.3}", pull.zmp_way_m),
+            format!("{:.3}", pull.hand_height_m),
+            format!("{:.3}", pull.displacement_m),
+            pull.time_s.map_or("never moves".to_owned(), |time_s| format!("{time_s:.2}")),
+        ]
+    };
+    let titles = ["robot", "k [N/m]", "Pmax [m]", "Za [m]", "x [m]", "t [s]"];
+    table::of_numbers(&titles, pulls.iter().map(cells))
 }
 
 fn matrix_table(rows: &[String], columns: &[String], matrix: &[Vec<f64>]) -> String {
