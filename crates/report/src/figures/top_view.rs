@@ -1,7 +1,7 @@
 //! Figure 16: feet and object from above.
 
 use super::{Runs, list};
-use crate::run_data::{RobotCourse, RunData, Stance};
+use crate::run_data::{ObjectCourse, RobotCourse, RunData, Stance};
 use crate::scene::{Axis, Figure, LegendEntry, Mark, Panel, Stroke};
 use crate::style;
 use core::ops::Range;
@@ -40,7 +40,9 @@ pub fn figure(runs: &Runs<'_>) -> Result<Figure, String> {
         }));
         marks.extend(object(runs, index, run));
     }
+    // Words lie over everything.
     for run in runs.data().take(1) {
+        marks.extend(times(runs, run));
         marks.extend(run.robots.iter().map(|robot| Mark::Label {
             at: robot.start_m(),
             text: robot.name.clone(),
@@ -94,10 +96,6 @@ fn sole(runs: &Runs<'_>, index: usize, stance: &Stance, colour: RGBColor) -> Mar
 
 fn object(runs: &Runs<'_>, index: usize, run: &RunData) -> Vec<Mark> {
     let object = &run.object;
-    let place = |tick: usize| {
-        let p_WA = object.X_WA(tick).translation;
-        (p_WA.x, p_WA.y)
-    };
     let nowhere = (f64::NAN, f64::NAN);
     let reference = object.X_WA_ref.iter();
     let reference =
@@ -105,23 +103,36 @@ fn object(runs: &Runs<'_>, index: usize, run: &RunData) -> Vec<Mark> {
     let path = |points, stroke| Mark::Path { points, stroke: runs.stroke(index, stroke) };
     let mut marks = vec![
         path(reference.collect(), Stroke::reference()),
-        path((0..object.X_WBody.len()).map(place).collect(), Stroke::solid(style::INK)),
+        path((0..object.X_WBody.len()).map(|tick| place(object, tick)).collect(), Stroke::solid(style::INK)),
     ];
-    let mut labelled: Option<(f64, f64)> = None;
-    for (tick, t) in outline_ticks(runs, run) {
+    for (tick, _) in outline_ticks(runs, run) {
         let stroke = Stroke { width_px: OUTLINE_PX, ..Stroke::solid(style::FAINT_INK) };
         let stroke = runs.stroke(index, stroke);
         marks.push(Mark::Outline { corners: object.outline(tick), fill: None, stroke });
-        let (x, y) = place(tick);
-        marks.push(Mark::Dot { at: (x, y), colour: style::INK });
-        let is_free = labelled.is_none_or(|(last_x, last_y)| (x - last_x).hypot(y - last_y) > LABEL_M);
-        if index == 0 && is_free && runs.walk() {
+        marks.push(Mark::Dot { at: place(object, tick), colour: style::INK });
+    }
+    marks
+}
+
+/// When the object was where, along its path; not too near to each other.
+fn times(runs: &Runs<'_>, run: &RunData) -> Vec<Mark> {
+    let mut labelled: Option<(f64, f64)> = None;
+    let mut marks = Vec::new();
+    for (tick, t) in outline_ticks(runs, run).into_iter().filter(|_| runs.walk()) {
+        let (x, y) = place(&run.object, tick);
+        if labelled.is_none_or(|(last_x, last_y)| (x - last_x).hypot(y - last_y) > LABEL_M) {
             labelled = Some((x, y));
             let at = (x, y + 0.4 * LABEL_M);
             marks.push(Mark::Label { at, text: format!("{t} s"), colour: style::FAINT_INK });
         }
     }
     marks
+}
+
+/// Σa from above.
+fn place(object: &ObjectCourse, tick: usize) -> (f64, f64) {
+    let p_WA = object.X_WA(tick).translation;
+    (p_WA.x, p_WA.y)
 }
 
 /// The ticks in which the object's outline is drawn, and their times.
