@@ -27,6 +27,7 @@ mod save;
 pub mod scenario;
 pub mod sweep;
 mod validate;
+mod world;
 
 pub use error::{KeyError, LoadConfigError};
 pub use load::{LoadedRobot, LoadedScenario, load_robot, load_scenario};

@@ -3,6 +3,7 @@
 pub use crate::coordination::{Coordination, Policy};
 pub use crate::grasp::Grasp;
 pub use crate::motion::{Motion, RandomMotion, Segment};
+pub use crate::world::{FixedBox, World};
 use serde::{Deserialize, Serialize};
 
 /// One run, as `config/scenarios/*.toml` describe it. The team's file lies underneath: what the
@@ -47,7 +48,10 @@ pub struct Scenario {
     /// How robots keep their balance.
     #[serde(default)]
     pub balance: Balance,
-    /// The simulated world.
+    /// What stands around the team.
+    #[serde(default)]
+    pub world: World,
+    /// The simulated physics.
     #[serde(default)]
     pub physics: Physics,
     /// What the simulated sensors add to the truth.
@@ -239,7 +243,7 @@ pub enum Control {
     Force,
 }
 
-/// The simulated world.
+/// The simulated physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Physics {

@@ -308,6 +308,20 @@ fn robots_have_names_of_their_own_and_arms_enough() {
         "--set robots.0.name=left arm: robots.0.name: found \"left arm\", expected 1 to 64 letters, digits, _ or -",
     );
     options_give(
+        &["world.boxes.1.name=wall"],
+        "--set world.boxes.1.name=wall: world.boxes.1.name: found \"wall\" again, expected each name once",
+    );
+    options_give(
+        &["world.boxes.0.name=the wall"],
+        "--set world.boxes.0.name=the wall: world.boxes.0.name: found \"the wall\", expected 1 to 64 letters, digits, _ or -",
+    );
+    file_gives(
+        SCENARIO,
+        "position_m = [2.0",
+        "centre_m = [2.0",
+        "scenarios/lift.toml:37: world.boxes.0.centre_m: unknown key, expected one of name, position_m, size_m, yaw_deg, friction",
+    );
+    options_give(
         &["robots=[]"],
         "--set robots=[]: robots: found 0, expected 1 to 16 robots\n\
         --set robots=[]: robots: found 0 arms, expected at least 2 arms in the team",
@@ -332,6 +346,10 @@ fn quantities_lie_in_their_ranges() {
         ("hybrid.start_s", "-1", "a finite number from 0"),
         ("hybrid.start_s", "2", "a time before the end (2 s); leave it out for never"),
         ("physics.friction", "-1", "a finite number from 0"),
+        ("world.boxes.0.size_m.2", "0", "a finite number above 0"),
+        ("world.boxes.0.position_m.1", "inf", "a finite number"),
+        ("world.boxes.0.yaw_deg", "inf", "a finite number"),
+        ("world.boxes.0.friction", "-0.1", "a finite number from 0"),
         ("sensors.force_noise_n", "-1", "a finite number from 0"),
         ("coordination_delay_ticks", "17", "at most 16 ticks"),
         ("sensors.delay_ticks", "1001", "at most 1000 ticks"),

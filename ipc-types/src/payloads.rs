@@ -186,7 +186,11 @@ payload! {
         pub pose: PoseWire,
         /// True twist in the world.
         pub twist: TwistWire,
-        /// Contacts of this tick that nobody intended (robot-robot, self, robot-object, object-floor).
+        /// True wrench of the world's fixed boxes on the object, averaged over the last tick, at the
+        /// object's origin in world axes.
+        pub support_wrench: WrenchWire,
+        /// Contacts of this tick that nobody intended (robot-robot, self, robot-object, object-floor,
+        /// robot-box).
         pub unintended_contacts: u64,
         /// Geom ids of the first of them, plus one; 0 where there is none.
         pub unintended_pair: [u64; 2],

@@ -64,12 +64,29 @@ fn sizes_follow_from_the_limits() {
     let word = size_of::<f64>();
     assert_eq!(
         size_of::<Sensors>(),
-        word * (3 * MAX_JOINTS + 6 * MAX_HANDS + 6 * MAX_FEET + 3 + 3),
-        "three values by joint, wrists, ankles, gyroscope, accelerometer"
+        word * (3 * MAX_JOINTS + 6 * MAX_HANDS + 6 * MAX_FEET + 3 + 3 + 1),
+        "three values by joint, wrists, ankles, gyroscope, accelerometer, hands that hold"
     );
-    assert_eq!(size_of::<TeamCommand>(), word * ((7 + 6) * MAX_HANDS + 2), "poses and twists by hand");
-    assert_eq!(size_of::<JointCommand>(), word * (2 * MAX_JOINTS + 1), "two values by joint");
-    assert_eq!(size_of::<TeamState>(), word * (2 * 6 * MAX_HANDS_OF_TEAM + 2 * 7 + 1), "two wrenches by row");
+    assert_eq!(
+        size_of::<TeamCommand>(),
+        word * ((7 + 6 + 6) * MAX_HANDS + 4 + 3),
+        "poses, twists and wrenches by hand, step clock, hands to close, mode, tick"
+    );
+    assert_eq!(
+        size_of::<JointCommand>(),
+        word * (2 * MAX_JOINTS + 2),
+        "two values by joint, hands to close, tick"
+    );
+    assert_eq!(
+        size_of::<TeamState>(),
+        word * (2 * 6 * MAX_HANDS_OF_TEAM + 2 * 7 + 6 + 1 + 4 + 1),
+        "two wrenches by row, two poses, twist, share, step clock, mode"
+    );
+    assert_eq!(
+        size_of::<ObjectTruth>(),
+        word * (7 + 6 + 6 + 1 + 2 + 1),
+        "pose, twist, support, contacts, their first pair, robots"
+    );
 }
 
 #[test]
@@ -78,7 +95,7 @@ fn a_byte_is_named_by_the_field_that_holds_it() {
     assert_eq!(name_at(0), Some("joint_position_rad"));
     assert_eq!(name_at(8 * MAX_JOINTS - 1), Some("joint_position_rad"));
     assert_eq!(name_at(8 * MAX_JOINTS), Some("joint_velocity_rad_s"));
-    assert_eq!(name_at(size_of::<Sensors>() - 1), Some("imu_specific_force_m_s2"));
+    assert_eq!(name_at(size_of::<Sensors>() - 1), Some("holding_hands"));
     assert_eq!(name_at(size_of::<Sensors>()), None);
 }
 

@@ -2,8 +2,9 @@
 
 use crate::BuildWorldError;
 use crate::grasp::GraspSite;
-use crate::mjcf::{self, FLOOR, OBJECT, qualified};
+use crate::mjcf::{self, FLOOR, OBJECT, fixed_box, qualified};
 use crate::robot::Robot;
+use mikoshi_config::scenario::FixedBox;
 use mikoshi_humanoid::balance::PerFoot;
 use mikoshi_humanoid::estimate::SoleRectangle;
 use mikoshi_humanoid::model::FrameId;
@@ -80,6 +81,8 @@ pub struct FootLayout {
 pub enum GeomOwner {
     Floor,
     Object,
+    /// Of the world's boxes, all alike.
+    FixedBox,
     /// A robot's foot.
     Foot {
         robot: usize,
@@ -92,13 +95,18 @@ pub enum GeomOwner {
 }
 
 impl Layout {
-    pub fn of(model: &MjModel, robots: &[Robot], grasps: &[GraspSite]) -> Result<Self, BuildWorldError> {
+    pub fn of(
+        model: &MjModel,
+        boxes: &[FixedBox],
+        robots: &[Robot],
+        grasps: &[GraspSite],
+    ) -> Result<Self, BuildWorldError> {
         let find = Finder(model);
         let mut grasps = grasps.iter();
         let robots_layout = robots.iter().map(|robot| find.robot(robot, &mut grasps));
         let robots_layout = robots_layout.collect::<Result<_, _>>()?;
         let object = find.body(OBJECT)?;
-        let geoms = (0..model.ngeom() as usize).map(|geom| find.owner_of(geom, object.body, robots));
+        let geoms = (0..model.ngeom() as usize).map(|geom| find.owner_of(geom, object.body, boxes, robots));
         Ok(Self { robots: robots_layout, object, geoms: geoms.collect::<Result<_, _>>()? })
     }
 }
@@ -184,7 +192,13 @@ impl Finder<'_> {
         })
     }
 
-    fn owner_of(&self, geom: usize, object: usize, robots: &[Robot]) -> Result<GeomOwner, BuildWorldError> {
+    fn owner_of(
+        &self,
+        geom: usize,
+        object: usize,
+        boxes: &[FixedBox],
+        robots: &[Robot],
+    ) -> Result<GeomOwner, BuildWorldError> {
         let body = self.0.geom_bodyid()[geom] as usize;
         if body == object {
             return Ok(GeomOwner::Object);
@@ -192,6 +206,9 @@ impl Finder<'_> {
         let name = self.0.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
         if name == FLOOR {
             return Ok(GeomOwner::Floor);
+        }
+        if boxes.iter().any(|fixed| fixed_box(&fixed.name) == name) {
+            return Ok(GeomOwner::FixedBox);
         }
         // ROBOT/LINK#INDEX; a robot's name may hold a slash too, so whole names are compared.
         let link = name.rsplit_once('#').map_or(name, |(link, _)| link);

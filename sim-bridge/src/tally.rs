@@ -1,9 +1,11 @@
 //! What is summed up over the physics steps of one tick, for one robot.
 
 use crate::layout::{GeomOwner, Layout, RobotLayout};
+use crate::pose::body_pose;
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS};
-use mikoshi_spatial::{World, Wrench};
+use mikoshi_spatial::{Object, World, Wrench};
 use mujoco_rs::prelude::{MjData, MjModel};
+use mujoco_rs::wrappers::mj_auxiliary::MjContact;
 use nalgebra::{Matrix3, Vector3};
 
 /// Sums over the physics steps of one tick.
@@ -64,13 +66,23 @@ impl Tally {
     }
 }
 
-/// Contacts of one tick that nobody intended: all but those of a foot with the floor.
+/// What touched the object, and what nobody meant to touch, over the physics steps of one tick.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Unintended {
-    /// The largest number at once.
-    pub count: u64,
-    /// Geoms of the first, plus one.
-    pub first_pair: [u64; 2],
+pub struct Contacts {
+    steps: u32,
+    support_sum: Wrench<World>,
+    /// Unintended contacts: all but those of a foot with the floor and of the object with a fixed box. The
+    /// largest number at once.
+    pub unintended: u64,
+    /// Geoms of the first unintended one, plus one.
+    pub unintended_pair: [u64; 2],
+}
+
+impl Contacts {
+    /// Wrench of the fixed boxes on the object at its origin, averaged over the steps.
+    pub fn mean_support_wrench(&self) -> Wrench<World> {
+        self.support_sum * (1.0 / f64::from(self.steps.max(1)))
+    }
 }
 
 /// After a step, while its forces and contacts still stand: sorts all contacts.
@@ -78,9 +90,10 @@ pub fn count_contacts(
     data: &MjData<Box<MjModel>>,
     layout: &Layout,
     tallies: &mut [Tally],
-    unintended: &mut Unintended,
+    contacts: &mut Contacts,
 ) {
-    let mut count = 0;
+    contacts.steps += 1;
+    let mut unintended = 0;
     for (index, contact) in data.contact().iter().enumerate() {
         // Contacts within reach that don't push.
         if contact.efc_address < 0 {
@@ -91,22 +104,34 @@ pub fn count_contacts(
         // Of two geoms MuJoCo names a plane first.
         match owners {
             [GeomOwner::Floor, GeomOwner::Foot { robot, foot }] => {
-                // What the first geom does to the second, along the contact's axes, the normal first.
-                let [normal, first, second, spin, first_roll, second_roll] = data.contact_force(index);
-                let axes = Matrix3::from_row_slice(&contact.frame).transpose();
-                let force = axes * Vector3::new(normal, first, second);
-                let moment = axes * Vector3::new(spin, first_roll, second_roll);
                 tallies[robot].ground_sum[foot] +=
-                    Wrench::new(force, moment).shifted(&Vector3::from(contact.pos));
+                    contact_wrench(data, index, contact).shifted(&Vector3::from(contact.pos));
+                continue;
+            }
+            [GeomOwner::FixedBox, GeomOwner::Object] | [GeomOwner::Object, GeomOwner::FixedBox] => {
+                let on_second = contact_wrench(data, index, contact);
+                let on_object = if owners[1] == GeomOwner::Object { on_second } else { -on_second };
+                let origin = body_pose::<Object>(data, &layout.object).translation;
+                contacts.support_sum += on_object.shifted(&(Vector3::from(contact.pos) - origin));
                 continue;
             }
             [GeomOwner::Floor, GeomOwner::Part { robot }] => tallies[robot].is_on_the_floor = true,
             _ => {}
         }
-        count += 1;
-        if unintended.first_pair == [0; 2] {
-            unintended.first_pair = geoms.map(|geom| geom as u64 + 1);
+        unintended += 1;
+        if contacts.unintended_pair == [0; 2] {
+            contacts.unintended_pair = geoms.map(|geom| geom as u64 + 1);
         }
     }
-    unintended.count = unintended.count.max(count);
+    contacts.unintended = contacts.unintended.max(unintended);
+}
+
+/// What a contact's first geom does to the second, at the contact's point in world axes.
+fn contact_wrench(data: &MjData<Box<MjModel>>, index: usize, contact: &MjContact) -> Wrench<World> {
+    // Along the contact's axes, the normal first.
+    let [normal, first, second, spin, first_roll, second_roll] = data.contact_force(index);
+    let axes = Matrix3::from_row_slice(&contact.frame).transpose();
+    let force = axes * Vector3::new(normal, first, second);
+    let moment = axes * Vector3::new(spin, first_roll, second_roll);
+    Wrench::new(force, moment)
 }

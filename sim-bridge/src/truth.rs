@@ -2,7 +2,7 @@
 
 use crate::layout::{BodyLayout, HandLayout, Layout, RobotLayout};
 use crate::pose::{body_pose, body_twist, site_pose};
-use crate::tally::{Tally, Unintended};
+use crate::tally::{Contacts, Tally};
 use mikoshi_humanoid::balance::PerFoot;
 use mikoshi_humanoid::estimate::{self, SupportPolygon};
 use mikoshi_ipc_types::{MAX_HANDS, ObjectTruth, RobotTruth};
@@ -77,16 +77,12 @@ fn zero_moment_point(
 }
 
 /// The object of now, and what touched what in the last tick.
-pub fn of_object(
-    data: &MjData<Box<MjModel>>,
-    layout: &Layout,
-    unintended: &Unintended,
-    truth: &mut ObjectTruth,
-) {
+pub fn of_object(data: &MjData<Box<MjModel>>, layout: &Layout, contacts: &Contacts, truth: &mut ObjectTruth) {
     truth.pose = body_pose::<Object>(data, &layout.object).to_array();
     truth.twist = body_twist::<Object>(data, &layout.object).to_array();
-    truth.unintended_contacts = unintended.count;
-    truth.unintended_pair = unintended.first_pair;
+    truth.support_wrench = contacts.mean_support_wrench().to_array();
+    truth.unintended_contacts = contacts.unintended;
+    truth.unintended_pair = contacts.unintended_pair;
     truth.robot_count = layout.robots.len() as u64;
 }
 

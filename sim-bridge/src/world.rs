@@ -4,7 +4,7 @@ use crate::grasp::{self, GraspSite, Spring};
 use crate::layout::Layout;
 use crate::readings::{self, Noise};
 use crate::robot::Robot;
-use crate::tally::{self, Tally, Unintended};
+use crate::tally::{self, Contacts, Tally};
 use crate::truth;
 use crate::{BuildWorldError, LoadWorldError, StepWorldError, logging, mjcf};
 use mikoshi_config::RunSpec;
@@ -13,7 +13,7 @@ use mikoshi_spatial::Wrench;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};
 use nalgebra::Vector3;
 
-/// One simulated world: the robots of a run, their object, the floor.
+/// One simulated world: the robots of a run, their object, the floor, and the boxes that stand on it.
 ///
 /// # What is of which time
 /// After tick k's [`step`](Self::step) the world is at tick k + 1. Positions and velocities are of that
@@ -45,7 +45,7 @@ struct State {
 /// Workspace: nothing in it matters after a tick.
 struct Scratch {
     tallies: Box<[Tally]>,
-    unintended: Unintended,
+    contacts: Contacts,
     hand_wrenches: Box<[[Wrench<mikoshi_spatial::World>; MAX_HANDS]]>,
     simulator_state: Box<[f64]>,
 }
@@ -106,7 +106,7 @@ impl World {
         let Description { robots, grasps, spring, xml } = Description::of(run)?;
         let simulator = |error: &dyn core::fmt::Display| BuildWorldError::Simulator(error.to_string());
         let model = MjModel::from_xml_string(&xml).map_err(|error| simulator(&error))?;
-        let layout = Layout::of(&model, &robots, &grasps)?;
+        let layout = Layout::of(&model, &scenario.world.boxes, &robots, &grasps)?;
         let noise = layout.robots.iter().enumerate().map(|(index, robot)| {
             Noise::of(&scenario.sensors, scenario.seed, index, robot, scenario.control_period_s)
         });
@@ -134,7 +134,7 @@ impl World {
         };
         let scratch = Scratch {
             tallies: vec![Tally::empty(); robots.len()].into(),
-            unintended: Unintended::default(),
+            contacts: Contacts::default(),
             hand_wrenches: vec![[Wrench::zero(); MAX_HANDS]; robots.len()].into(),
             simulator_state: vec![0.0; state_size].into(),
         };
@@ -158,7 +158,7 @@ impl World {
         self.state.tick
     }
 
-    /// The name of a geom: `ROBOT/LINK#INDEX`, `object` or `floor`.
+    /// The name of a geom: `ROBOT/LINK#INDEX`, `world/BOX`, `object` or `floor`.
     pub fn geom_name(&self, geom: usize) -> Option<&str> {
         let model = self.data.model();
         (geom < model.ngeom() as usize).then(|| model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom))?
@@ -197,7 +197,7 @@ impl World {
             return Err(StepWorldError::NotFinite);
         }
         self.scratch.tallies.fill(Tally::empty());
-        self.scratch.unintended = Unintended::default();
+        self.scratch.contacts = Contacts::default();
         for substep in 1..=self.substeps {
             self.set_drives(commands, substep as f64 / self.substeps as f64);
             self.pull_by_springs();
@@ -209,8 +209,8 @@ impl World {
             for (tally, layout) in self.scratch.tallies.iter_mut().zip(&self.layout.robots) {
                 tally.count_torques(&self.data, layout);
             }
-            let Scratch { tallies, unintended, .. } = &mut self.scratch;
-            tally::count_contacts(&self.data, &self.layout, tallies, unintended);
+            let Scratch { tallies, contacts, .. } = &mut self.scratch;
+            tally::count_contacts(&self.data, &self.layout, tallies, contacts);
             if substep == self.substeps {
                 self.read_hand_wrenches();
             }
@@ -356,7 +356,7 @@ impl World {
             }
             truth::of_robot(&self.data, layout, tally, wrenches, truth);
         }
-        truth::of_object(&self.data, &self.layout, &self.scratch.unintended, &mut self.state.object);
+        truth::of_object(&self.data, &self.layout, &self.scratch.contacts, &mut self.state.object);
     }
 
     fn check(&self) -> Result<(), StepWorldError> {

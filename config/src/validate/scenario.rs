@@ -60,6 +60,7 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     checks.positive("gait.single_support_s", scenario.gait.single_support_s);
     checks.positive("gait.lift_m", scenario.gait.lift_m);
     checks.not_negative("physics.friction", scenario.physics.friction);
+    world(&mut checks, scenario);
     let sensors = &scenario.sensors;
     checks.not_negative("sensors.force_noise_n", sensors.force_noise_n);
     checks.not_negative("sensors.moment_noise_nm", sensors.moment_noise_nm);
@@ -76,6 +77,23 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
         );
     }
     checks.0
+}
+
+fn world(checks: &mut Checks, scenario: &Scenario) {
+    let boxes = &scenario.world.boxes;
+    checks.unique(boxes.iter().map(|fixed| fixed.name.as_str()), |index| format!("world.boxes.{index}.name"));
+    for (index, fixed) in boxes.iter().enumerate() {
+        let key = format!("world.boxes.{index}");
+        checks.name(format_args!("{key}.name"), &fixed.name);
+        checks.finite_numbers(&format!("{key}.position_m"), &fixed.position_m);
+        for axis in 0..3 {
+            checks.positive(format_args!("{key}.size_m.{axis}"), fixed.size_m[axis]);
+        }
+        checks.finite(format_args!("{key}.yaw_deg"), fixed.yaw_deg);
+        if let Some(friction) = fixed.friction {
+            checks.not_negative(format_args!("{key}.friction"), friction);
+        }
+    }
 }
 
 fn times(checks: &mut Checks, scenario: &Scenario) {

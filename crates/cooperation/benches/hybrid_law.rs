@@ -50,6 +50,8 @@ fn tick(bencher: Bencher, internal_forces: InternalForces) {
         filter_hz: 10.0,
         lead_limit_m: 0.02,
         lead_limit_rad: 0.05,
+        approach_limit_m_s: 0.01,
+        approach_limit_rad_s: 0.02,
     };
     let law = HybridLaw::new(internal_forces, parameters).unwrap();
     let mut state = Box::new(HybridState::<CAPACITY>::at_grasp(&sticks).unwrap());

@@ -40,6 +40,8 @@
 //!     filter_hz: 10.0,
 //!     lead_limit_m: 0.02,
 //!     lead_limit_rad: 0.05,
+//!     approach_limit_m_s: 0.01,
+//!     approach_limit_rad_s: 0.02,
 //! };
 //! let law = HybridLaw::new(internal_forces, parameters)?;
 //! let mut state = HybridState::<2>::at_grasp(&sticks)?;
@@ -100,8 +102,8 @@ pub use hybrid::{
     HybridLaw, HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, StartHybridError,
 };
 pub use internal_forces::{
-    BuildInternalForcesError, InternalForces, RowCombination, change_of_representation, pair_matrix,
-    pairwise_forces,
+    BuildInternalForcesError, InternalForces, OBJECT_ROW, RowCombination, change_of_representation,
+    pair_matrix, pairwise_forces,
 };
 pub use linear::Linear;
 pub use selection::{Axis, Control, Selection};

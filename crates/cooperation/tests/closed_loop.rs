@@ -8,7 +8,7 @@ use common::{ClosedLoop, FILTER_HZ, PERIOD_S, STIFFNESS, parameters, team};
 use mikoshi_cooperation::{
     Axis, Control, ForceGains, HybridLaw, HybridParameters, InternalForces, critical_loop_gain,
 };
-use mikoshi_spatial::{Object, Twist};
+use mikoshi_spatial::{Object, Twist, Wrench};
 use nalgebra::Vector3;
 
 const TICKS_OF_3_S: usize = 600;
@@ -120,10 +120,58 @@ fn a_force_controlled_object_axis_moves_the_object() {
     let moved = start.displacement_to(&world.X_WA).linear;
     // Each of four hands gives way to a quarter of 2 N, kz kh · 2 N / 4 a tick: the first shows after one tick
     // of delay, the last doesn't yet.
-    // A force without moment at the tips asks the hands for moments, to which they turn a little.
     let expected = 199.0 * 0.05 * 1e-3 * 2.0 / 4.0;
-    assert!((moved.x - expected).abs() < 0.01 * expected, "{moved:?}");
-    assert!(moved.yz().norm() < 0.02 * expected, "{moved:?}");
+    assert!((moved.x - expected).abs() < 1e-6 * expected, "{moved:?}");
+    assert!(moved.yz().norm() < 1e-6 * expected, "{moved:?}");
+    // All hands go as one body: nobody strains against another.
+    let (force, moment) = world.largest_internal();
+    assert!(force < 1e-9 && moment < 1e-9, "{force} N, {moment} Nm");
+}
+
+#[test]
+fn an_approach_is_no_faster_than_its_limit() {
+    let law = law(two_robots(), |parameters, _| {
+        parameters.selection.select(0, Axis::X, Control::Force).unwrap();
+        parameters.selection.select(0, Axis::Yaw, Control::Force).unwrap();
+        (parameters.approach_limit_m_s, parameters.approach_limit_rad_s) = (0.004, 0.008);
+    });
+    let mut world = ClosedLoop::new(law, 0.0, 0);
+    let start = world.X_WA;
+    (world.force_ref.external.force.x, world.force_ref.external.moment.z) = (-1e6, 1e6);
+    world.run(100);
+    let moved = start.displacement_to(&world.X_WA);
+    assert!((moved.linear.x + 100.0 * PERIOD_S * 0.004).abs() < 1e-6, "{moved:?}");
+    assert!((moved.angular.z - 100.0 * PERIOD_S * 0.008).abs() < 1e-6, "{moved:?}");
+}
+
+/// Whatever an object is pressed against: the loop through a rigid wall has the loop gain of a single hand.
+#[test]
+fn external_forces_against_a_rigid_wall_come_at_the_rate_of_the_loop_gain() {
+    for arms in [vec![1, 1], vec![2; 4], vec![1, 3, 2]] {
+        let slow = law(InternalForces::balanced_tree(&team(&arms)), |parameters, _| {
+            for axis in [Axis::X, Axis::Y, Axis::Z, Axis::Roll, Axis::Pitch, Axis::Yaw] {
+                parameters.selection.select(0, axis, Control::Force).unwrap();
+            }
+            parameters.kh = ForceGains::of_loop_gain(0.01, parameters.kz, STIFFNESS);
+        });
+        let mut world = ClosedLoop::new(slow, 0.0, 0);
+        world.is_object_fixed = true;
+        world.force_ref.external = Wrench::new(Vector3::new(8.0, -6.0, 4.0), Vector3::new(1.0, 2.0, -1.5));
+        world.run(401);
+        let lacking = world.force_ref.external - world.out.force.external;
+        let left = lacking.to_vector().component_div(&world.force_ref.external.to_vector());
+        // (1 − 0.01)^400 = 0.018; levers that don't cancel couple the axes.
+        let [x, y, z, roll, pitch, yaw] = <[f64; 6]>::from(left);
+        // (1 − 0.01)^400 = 0.018, a little less for the force at the start; levers that don't cancel
+        // couple roll and pitch with the forces.
+        assert!([x, y, z, yaw].iter().all(|left| (0.015..0.02).contains(left)), "{arms:?}: {left:?}");
+        assert!(roll.abs() < 0.02 && pitch.abs() < 0.02, "{arms:?}: {left:?}");
+        world.run(1000);
+        let lacking = world.force_ref.external - world.out.force.external;
+        assert!(lacking.to_vector().amax() < 0.01, "{arms:?}: {lacking:?}");
+        let (force, moment) = world.largest_internal();
+        assert!(force < 0.02 && moment < 0.02, "{arms:?}: {force} N, {moment} Nm");
+    }
 }
 
 #[test]

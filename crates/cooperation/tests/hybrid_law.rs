@@ -114,22 +114,36 @@ fn hand_displacements_by_the_paper(case: &Case, z_c: &GeneralizedPosition) -> Ve
     }
     let h_c = &to_object_axes * &W_and_C * q_b;
     let z_c = &to_object_axes * U.transpose() * y_b;
-    let external = |first: Vector6<f64>, others: Vec<Vector6<f64>>| {
+    let with_first = |first: Vector6<f64>, others: Vec<Vector6<f64>>| {
         stack(core::iter::once(first).chain(others).collect())
     };
-    let h_r = external(
+    let h_r = with_first(
         case.force_ref.external.to_vector(),
         case.force_ref.internal.iter().map(Wrench::to_vector).collect(),
     );
-    let z_r = external(
+    let z_r = with_first(
         X_WA.displacement_to(&case.position_ref.external).to_vector(),
         case.position_ref.internal.iter().map(Twist::to_vector).collect(),
     );
     let S = DMatrix::from_diagonal(&stack(parameters.selection.diagonal().collect()));
     let not_S = DMatrix::identity(6 * n, 6 * n) - &S;
-    let dz = (&not_S * z_r - &not_S * z_c) * parameters.kz;
+    let mut dz = &not_S * z_r - &not_S * z_c;
+    // Eq. 34 for the external row: kh by how stiff all hands are together.
+    let mut external = DVector::zeros(6 * n);
+    external.rows_mut(0, 6).copy_from(&(&S * (&h_r - &h_c)).rows(0, 6));
+    let levers = hands().map(|(stick, hand)| hand.pose.rotation * stick.X_HB.translation);
+    let together: Vector6<f64> = levers
+        .map(|l| {
+            let turning = Vector3::new(l.yz().norm_squared(), l.xz().norm_squared(), l.xy().norm_squared());
+            let turning = turning / parameters.kh.m_n + Vector3::repeat(1.0 / parameters.kh.rad_nm);
+            Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0) / parameters.kh.m_n
+                + Vector6::new(0.0, 0.0, 0.0, turning.x, turning.y, turning.z)
+        })
+        .sum();
+    dz.rows_mut(0, 6).zip_apply(&external.rows(0, 6).component_div(&together), |dz, more| *dz += more);
+    let dz = dz * parameters.kz;
     let dy = W_and_C.transpose() * to_object_axes.transpose() * dz;
-    let dq = &U * to_object_axes.transpose() * &S * (h_r - h_c);
+    let dq = &U * to_object_axes.transpose() * (&S * (h_r - h_c) - external);
     let object_twist = not_S.fixed_view::<6, 6>(0, 0) * case.twist_ref.to_vector();
     let (v, w): (Vector3<f64>, Vector3<f64>) =
         (object_twist.fixed_rows::<3>(0).into(), object_twist.fixed_rows::<3>(3).into());
@@ -433,6 +447,8 @@ fn parameters_out_of_range_make_no_law() {
     assert_eq!(name_of(|p| p.filter_hz = -1.0), "filter_hz");
     assert_eq!(name_of(|p| p.lead_limit_m = f64::INFINITY), "lead_limit_m");
     assert_eq!(name_of(|p| p.lead_limit_rad = 0.0), "lead_limit_rad");
+    assert_eq!(name_of(|p| p.approach_limit_m_s = 0.0), "approach_limit_m_s");
+    assert_eq!(name_of(|p| p.approach_limit_rad_s = f64::INFINITY), "approach_limit_rad_s");
     assert_eq!(name_of(|p| p.kh.m_n = -1.0), "kh.m_n");
     assert_eq!(name_of(|p| p.kh.rad_nm = f64::NAN), "kh.rad_nm");
     assert_eq!(name_of(|p| p.selection = Selection::object_position_internal_force(5)), "selections");

@@ -3,7 +3,7 @@
 use crate::canonical::Observation;
 use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
 use crate::truth::{FootTracker, ObjectTracker, TrackedObject};
-use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, RobotState, RobotTruth, TeamState, mode};
+use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, ObjectTruth, RobotState, RobotTruth, TeamState, mode};
 use mikoshi_spatial::{Object, Pose, World, Wrench};
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
@@ -111,6 +111,9 @@ impl Figures {
             return;
         };
         self.object.observe(&object);
+        if self.is_end(observation.tick()) {
+            self.object.observe_end(&observation.object_truth.payload);
+        }
         let team_state = &observation.team_state.payload;
         self.observe_internal_forces(observation.tick(), &object.internal, team_state);
         let seen = observation.robot_truth.iter().zip(&observation.robot_state);
@@ -123,11 +126,17 @@ impl Figures {
         }
     }
 
+    /// Whether this is one of the last ticks, over which the end is judged.
+    fn is_end(&self, tick: u64) -> bool {
+        let window = (WINDOW_S / self.run.control_period_s).round() as u64;
+        tick + window >= self.run.ticks
+    }
+
     fn observe_internal_forces(&mut self, tick: u64, forces: &[Wrench<Object>], team_state: &TeamState) {
         let seconds = |s: f64| (s / self.run.control_period_s).round() as u64;
         let start = self.run.hybrid_start_tick.unwrap_or(0);
         let judged = start + seconds(JUDGED_AFTER_S)..=start + seconds(JUDGED_AFTER_S + WINDOW_S);
-        let is_end = tick + seconds(WINDOW_S) >= self.run.ticks;
+        let is_end = self.is_end(tick);
         let is_compared =
             tick + seconds(COMPARED_S) >= self.run.ticks && mode::is_hybrid(team_state.team_mode);
         if is_end {
@@ -196,6 +205,8 @@ struct ObjectFigures {
     samples: u64,
     squares: [f64; 6],
     peaks: [f64; 6],
+    end_samples: u64,
+    support_force_end_sum_n: [f64; 3],
 }
 
 impl ObjectFigures {
@@ -210,6 +221,13 @@ impl ObjectFigures {
         for ((square, peak), error) in self.squares.iter_mut().zip(&mut self.peaks).zip(error) {
             *square += error * error;
             *peak = peak.max(error.abs());
+        }
+    }
+
+    fn observe_end(&mut self, truth: &ObjectTruth) {
+        self.end_samples += 1;
+        for (sum, force) in self.support_force_end_sum_n.iter_mut().zip(truth.support_wrench) {
+            *sum += force;
         }
     }
 
@@ -230,6 +248,7 @@ impl ObjectFigures {
             attitude_peak_rad,
             travel_m,
             travel_rad,
+            support_force_end_n: self.support_force_end_sum_n.map(|sum| sum / self.end_samples.max(1) as f64),
             frame_offset_m: X_BodyA.map_or([0.0; 3], |X_BodyA| X_BodyA.translation.into()),
         }
     }

@@ -50,6 +50,8 @@ pub struct ObjectSummary {
     pub travel_m: [f64; 3],
     /// True rotation over the whole run.
     pub travel_rad: [f64; 3],
+    /// Mean force of the world's fixed boxes on the object over the last 0.2 s, in world axes.
+    pub support_force_end_n: [f64; 3],
     /// Where Σa, the frame that control created on the object when it started, lies in the object's body:
     /// what the hands could not know of how they grasped.
     pub frame_offset_m: [f64; 3],

@@ -2,8 +2,10 @@
 
 use mikoshi_config::Scenario;
 use mikoshi_config::scenario::{AxisControl, Control, Thresholds};
+use mikoshi_cooperation::OBJECT_ROW;
 use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
 
+const GRAVITY_M_S2: f64 = 9.81;
 /// How long after its start the hybrid law is judged.
 const JUDGED_AFTER_S: f64 = 3.0;
 
@@ -27,8 +29,9 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
         }
     }
     let rows = summary.internal.as_slice();
+    let external_force_n = external_force_end(scenario, &summary.object);
     for axis in &scenario.hybrid.axes {
-        judge_axis(&mut judge, limits, axis, rows);
+        judge_axis(&mut judge, limits, axis, rows, &external_force_n);
     }
     let (when, observed) =
         ("3 s after the start", is_judged_after_3s(scenario, summary.sim_time_s).then_some(rows));
@@ -47,15 +50,24 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
 
 fn judge_object(judge: &mut Judge, scenario: &Scenario, object: &ObjectSummary) {
     let limits = &scenario.thresholds;
-    let worst = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
-    for (what, values, limit, unit) in [
-        ("object position error", object.position_peak_m, limits.object_position_peak_m, "m"),
-        ("object position error, RMS", object.position_rms_m, limits.object_position_rms_m, "m"),
-        ("object attitude error", object.attitude_peak_rad, limits.object_attitude_peak_rad, "rad"),
-        ("object attitude error, RMS", object.attitude_rms_rad, limits.object_attitude_rms_rad, "rad"),
+    // Along an axis under force control there is no position to keep.
+    let is_position = |axis: usize| {
+        let mut of_object = scenario.hybrid.axes.iter().filter(|exception| exception.row == OBJECT_ROW);
+        !of_object.any(|exception| exception.control == Control::Force && exception.axis as usize == axis)
+    };
+    let worst_of = |values: [f64; 3], first: usize| {
+        let held = values.into_iter().enumerate().filter(|(axis, _)| is_position(first + axis));
+        // NaN is the largest.
+        held.map(|(_, value)| value).max_by(f64::total_cmp).unwrap_or(0.0)
+    };
+    for (what, values, first, limit, unit) in [
+        ("object position error", object.position_peak_m, 0, limits.object_position_peak_m, "m"),
+        ("object position error, RMS", object.position_rms_m, 0, limits.object_position_rms_m, "m"),
+        ("object attitude error", object.attitude_peak_rad, 3, limits.object_attitude_peak_rad, "rad"),
+        ("object attitude error, RMS", object.attitude_rms_rad, 3, limits.object_attitude_rms_rad, "rad"),
     ] {
         if let Some(limit) = limit {
-            judge.at_most(what, worst(values), limit, unit);
+            judge.at_most(what, worst_of(values, first), limit, unit);
         }
     }
     let norm = |values: [f64; 3]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
@@ -68,7 +80,13 @@ fn judge_object(judge: &mut Judge, scenario: &Scenario, object: &ObjectSummary) 
 }
 
 /// One axis that departs from the default, if what it is to bear is known.
-fn judge_axis(judge: &mut Judge, limits: &Thresholds, axis: &AxisControl, rows: &[InternalSummary]) {
+fn judge_axis(
+    judge: &mut Judge,
+    limits: &Thresholds,
+    axis: &AxisControl,
+    rows: &[InternalSummary],
+    external_force_n: &[f64; 3],
+) {
     let reference = match axis.control {
         Control::Force => Some(axis.reference),
         Control::Position => axis.expected_force,
@@ -79,9 +97,11 @@ fn judge_axis(judge: &mut Judge, limits: &Thresholds, axis: &AxisControl, rows: 
         _ => (limits.axis_reference_error_end_nm, "Nm"),
     };
     let (Some(reference), Some(limit)) = (reference, limit) else { return };
-    // The external force has no figure: NaN fails.
-    let row = rows.iter().find(|row| row.name == axis.row);
-    let end = row.map_or(f64::NAN, |row| row.end_mean[component]);
+    let end = match rows.iter().find(|row| row.name == axis.row) {
+        Some(row) => row.end_mean[component],
+        // The external moment has no figure: NaN fails.
+        None => external_force_n.get(component).copied().unwrap_or(f64::NAN),
+    };
     if end.is_nan() || (end - reference).abs() > limit {
         judge.fail(format!(
             "{} of {}: {} at the end, expected {reference} {unit} within {limit} {unit}",
@@ -90,6 +110,13 @@ fn judge_axis(judge: &mut Judge, limits: &Thresholds, axis: &AxisControl, rows: 
             quantity(end, unit),
         ));
     }
+}
+
+/// What all hands together apply to the resting object: they hold its weight, and press it against what
+/// supports it.
+fn external_force_end(scenario: &Scenario, object: &ObjectSummary) -> [f64; 3] {
+    let [x, y, z] = object.support_force_end_n;
+    [0.0 - x, 0.0 - y, scenario.object.mass_kg * GRAVITY_M_S2 - z]
 }
 
 /// Whether the run was long enough to be judged [`JUDGED_AFTER_S`] after its hybrid law started.
@@ -203,10 +230,11 @@ mod tests {
         let limits = Thresholds { axis_reference_error_end_n: Some(0.5), ..Thresholds::default() };
         let end_mean = [19.6, 4.4, 0.0, 7.0, 0.0, 0.0];
         let rows = [InternalSummary { name: "L|R".into(), end_mean, ..InternalSummary::default() }];
+        let external = [39.8, 0.0, 29.4];
         let failures = |row: &str, axis, control, reference, expected_force| {
             let axis = AxisControl { row: row.into(), axis, control, reference, expected_force };
             let mut judge = Judge::default();
-            judge_axis(&mut judge, &limits, &axis, &rows);
+            judge_axis(&mut judge, &limits, &axis, &rows, &external);
             judge.failures
         };
         assert_eq!(failures("L|R", Axis::X, Control::Force, 20.0, None), [""; 0]);
@@ -222,7 +250,19 @@ mod tests {
         );
         // Moments have a limit of their own, and nothing that was not observed counts as met.
         assert_eq!(failures("L|R", Axis::Roll, Control::Force, 0.0, None), [""; 0]);
+        assert_eq!(failures("object", Axis::X, Control::Force, 40.0, None), [""; 0]);
         assert_eq!(failures("object", Axis::X, Control::Force, 0.0, None).len(), 1);
+        let limits = Thresholds { axis_reference_error_end_nm: Some(0.5), ..Thresholds::default() };
+        let yaw = AxisControl {
+            row: "object".into(),
+            axis: Axis::Yaw,
+            control: Control::Force,
+            reference: 0.0,
+            expected_force: None,
+        };
+        let mut judge = Judge::default();
+        judge_axis(&mut judge, &limits, &yaw, &rows, &external);
+        assert_eq!(judge.failures.len(), 1);
     }
 
     #[test]

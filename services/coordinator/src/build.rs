@@ -12,6 +12,10 @@ use mikoshi_spatial::{Hand, Object, Pose};
 /// How far a hand's reference may lead what its robot makes of it.
 const LEAD_LIMIT_M: f64 = 0.02;
 const LEAD_LIMIT_RAD: f64 = 0.05;
+/// How fast force control may bring the object to what it is to press against: object and forearms, some
+/// 30 kg, that meet a wall of 200 kN/m at this speed press it with 12 N at once.
+const APPROACH_LIMIT_M_S: f64 = 0.005;
+const APPROACH_LIMIT_RAD_S: f64 = 0.01;
 
 /// Why a run has no coordinator.
 #[derive(Debug, thiserror::Error)]
@@ -68,6 +72,8 @@ pub fn build_hybrid_law(run: &RunSpec) -> Result<HybridLaw, BuildCoordinatorErro
         filter_hz: hybrid.filter_hz,
         lead_limit_m: LEAD_LIMIT_M,
         lead_limit_rad: LEAD_LIMIT_RAD,
+        approach_limit_m_s: APPROACH_LIMIT_M_S,
+        approach_limit_rad_s: APPROACH_LIMIT_RAD_S,
     };
     Ok(HybridLaw::new(internal_forces, parameters)?)
 }

@@ -28,20 +28,31 @@ impl GraspCompliance {
         }
     }
 
-    /// How far the object is from the mean of the sticks' tips (eq. 27), by the hands' filtered wrenches,
-    /// which go one tick on. `shares` are the tips' weights in that mean.
+    /// How far the object is from the mean of the sticks' tips (eq. 27), by the internal part of the hands'
+    /// filtered wrenches, which go one tick on. `shares` are the tips' weights in that mean, and in what
+    /// they bear of the external wrench (W⁻).
+    ///
+    /// The external part is left out. An object that something holds, a wall that it is pressed against or
+    /// what it rests on, would else seem not to follow its hands at all, and they would push it harder and
+    /// harder until it slips. Of the object's weight, which is always there, nobody is the wiser.
     pub(crate) fn object_yield<'a>(
         &self,
         filtered: &mut [[f64; 6]],
-        hands: impl Iterator<Item = (&'a HandInput, &'a VirtualStick)>,
+        hands: impl Iterator<Item = (&'a HandInput, &'a VirtualStick)> + Clone,
         shares: &[f64],
     ) -> Twist<World> {
-        let mut mean = Twist::zero();
-        for ((filtered, share), (hand, stick)) in filtered.iter_mut().zip(shares).zip(hands) {
+        let mut external = Wrench::zero();
+        for (filtered, (hand, stick)) in filtered.iter_mut().zip(hands.clone()) {
             for (filtered, wrench) in filtered.iter_mut().zip(hand.wrench.to_array()) {
                 *filtered = wrench + self.filter_pole * (*filtered - wrench);
             }
-            mean += self.tip_yield(&hand.pose, stick, &Wrench::from_array(filtered)) * *share;
+            external += stick.tip_wrench(&hand.pose, &Wrench::from_array(filtered));
+        }
+        let mut mean = Twist::zero();
+        for ((filtered, share), (hand, stick)) in filtered.iter().zip(shares).zip(hands) {
+            let borne = stick.hand_wrench(&hand.pose, &(external * *share));
+            let internal = Wrench::from_array(filtered) - borne;
+            mean += self.tip_yield(&hand.pose, stick, &internal) * *share;
         }
         mean
     }
@@ -64,35 +75,46 @@ mod tests {
     use mikoshi_spatial::Object;
     use nalgebra::{UnitQuaternion, Vector3};
 
-    #[test]
-    fn an_object_hangs_behind_hands_that_push_it() {
-        let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 1e-2, filter_pole: 0.0 };
-        let hand = |y: f64, force: Vector3<f64>, moment: Vector3<f64>| {
-            let pose = Pose::<World, Hand>::new(Vector3::new(0.0, y, 0.0), UnitQuaternion::identity());
-            HandInput { pose, pose_commanded: pose, wrench: Wrench::new(force, moment) }
-        };
-        let lift = Vector3::new(0.0, 0.0, 2.0);
-        let hands = [hand(0.5, lift, Vector3::zeros()), hand(-0.5, lift, Vector3::new(0.4, 0.0, 0.0))];
+    fn hand(y: f64, force: Vector3<f64>, moment: Vector3<f64>) -> HandInput {
+        let pose = Pose::<World, Hand>::new(Vector3::new(0.0, y, 0.0), UnitQuaternion::identity());
+        HandInput { pose, pose_commanded: pose, wrench: Wrench::new(force, moment) }
+    }
+
+    fn found(compliance: &GraspCompliance, hands: &[HandInput; 2]) -> Twist<World> {
         let sticks = hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &Pose::<World, Object>::identity()));
-        let mut filtered = [[0.0; 6]; 2];
-        let found = compliance.object_yield(&mut filtered, hands.iter().zip(&sticks), &[0.5, 0.5]);
-        // Both lift 2 mm short; one turns 4 mrad about its palm, half a metre from the middle.
-        assert!(
-            (found.linear - Vector3::new(0.0, 0.0, -0.002 - 0.5 * 0.004 * 0.5)).norm() < 1e-12,
-            "{found:?}"
-        );
-        assert!((found.angular - Vector3::new(-0.002, 0.0, 0.0)).norm() < 1e-12);
+        compliance.object_yield(&mut [[0.0; 6]; 2], hands.iter().zip(&sticks), &[0.5, 0.5])
+    }
+
+    #[test]
+    fn an_object_hangs_behind_hands_that_strain_it() {
+        let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 1e-2, filter_pole: 0.0 };
+        // One turns by 4 mrad about its palm, half a metre from the middle; the other holds against it.
+        let turn = Vector3::new(0.4, 0.0, 0.0);
+        let hands = [hand(0.5, Vector3::zeros(), turn), hand(-0.5, Vector3::zeros(), -turn)];
+        let found = found(&compliance, &hands);
+        assert!((found.linear - Vector3::new(0.0, 0.0, 0.5 * 0.004)).norm() < 1e-12, "{found:?}");
+        assert!(found.angular.norm() < 1e-12);
+    }
+
+    #[test]
+    fn what_the_hands_bear_together_is_no_yield() {
+        let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 1e-2, filter_pole: 0.0 };
+        // 4 N and, about the middle between them, 0.4 Nm, as W⁻ deals them out.
+        let (lift, turn) = (Vector3::new(0.0, 0.0, 2.0), Vector3::new(0.2, 0.0, 0.0));
+        let lever = Vector3::new(1.0, 0.0, 0.0);
+        let hands = [hand(0.5, lift, turn - lever), hand(-0.5, lift, turn + lever)];
+        let found = found(&compliance, &hands);
+        assert!(found.linear.norm() < 1e-12 && found.angular.norm() < 1e-12, "{found:?}");
     }
 
     #[test]
     fn noise_is_filtered_before_it_moves_the_object() {
         let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 0.0, filter_pole: 0.9 };
-        let pose = Pose::<World, Hand>::identity();
-        let wrench = Wrench::new(Vector3::new(10.0, 0.0, 0.0), Vector3::zeros());
-        let hand = HandInput { pose, pose_commanded: pose, wrench };
-        let stick = VirtualStick::at_grasp(&pose, &Pose::<World, Object>::identity());
-        let mut filtered = [[0.0; 6]];
-        let found = compliance.object_yield(&mut filtered, [(&hand, &stick)].into_iter(), &[1.0]);
-        assert!((found.linear.x + 0.001).abs() < 1e-12, "a tenth of 10 N by 1 mm/N");
+        let pull = Vector3::new(0.0, 10.0, 0.0);
+        let hands = [hand(0.5, pull, Vector3::zeros()), hand(-0.5, -pull, Vector3::zeros())];
+        let sticks = hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &Pose::<World, Object>::identity()));
+        let mut filtered = [[0.0; 6]; 2];
+        let found = compliance.object_yield(&mut filtered, hands.iter().zip(&sticks), &[1.0, 0.0]);
+        assert!((found.linear.y + 0.001).abs() < 1e-12, "a tenth of 10 N by 1 mm/N: {found:?}");
     }
 }

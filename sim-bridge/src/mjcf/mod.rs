@@ -8,11 +8,11 @@
 //!
 //! # What touches what
 //! Everything touches everything, except bodies that are neighbours in a robot (no colliding body lies
-//! between them) and a grasping hand with the object.
+//! between them), a grasping hand with the object, and what stands fixed in the world with its like.
 //!
 //! # Names
-//! Bodies, joints, actuators and sites are `ROBOT/LINK`, geoms `ROBOT/LINK#0`, `#1` …; `floor` and
-//! `object` stand alone.
+//! Bodies, joints, actuators and sites are `ROBOT/LINK`, geoms `ROBOT/LINK#0`, `#1` …; the world's boxes
+//! are `world/BOX`; `floor` and `object` stand alone.
 
 mod robot;
 mod text;
@@ -24,13 +24,19 @@ use crate::grasp::GraspSite;
 use crate::robot::{Robot, isometry};
 use core::fmt::Write;
 use mikoshi_config::Scenario;
-use mikoshi_config::scenario::Grasp;
+use mikoshi_config::scenario::{FixedBox, Grasp};
 use text::{escape, numbers, pose};
 
 /// The floor's and the object's names.
 pub const FLOOR: &str = "floor";
 /// The object's body, geom and joint.
 pub const OBJECT: &str = "object";
+
+/// The name of a fixed box. No geom of a robot is called so, even of a robot called `world`: theirs have
+/// an index.
+pub fn fixed_box(name: &str) -> String {
+    qualified("world", name)
+}
 
 /// `ROBOT/ELEMENT`.
 pub fn qualified(robot: &str, element: &str) -> String {
@@ -72,6 +78,9 @@ fn write_world(
     robot::write_meshes(xml, robots)?;
     writeln!(xml, "  <worldbody>")?;
     writeln!(xml, r#"    <geom name="{FLOOR}" type="plane" size="20 20 1"/>"#)?;
+    for fixed in &scenario.world.boxes {
+        write_fixed_box(xml, fixed)?;
+    }
     write_object(xml, scenario, grasps)?;
     for robot in robots {
         robot::write_bodies(xml, robot)?;
@@ -104,21 +113,40 @@ fn write_world(
     writeln!(xml, "</mujoco>")
 }
 
+fn write_fixed_box(xml: &mut String, fixed: &FixedBox) -> core::fmt::Result {
+    // Of two geoms the one of higher priority says what the friction is; else the larger one counts.
+    let friction = fixed
+        .friction
+        .map_or_else(String::new, |friction| format!(r#" priority="1" friction="{friction} 0.005 0.0001""#));
+    writeln!(
+        xml,
+        r#"    <geom name="{}" type="box" pos="{}" quat="{}" size="{}"{friction}/>"#,
+        escape(&fixed_box(&fixed.name)),
+        numbers(&fixed.position_m),
+        numbers(&about_z(fixed.yaw_deg)),
+        numbers(&fixed.size_m.map(|edge| 0.5 * edge)),
+    )
+}
+
+/// `qw qx qy qz` of a heading.
+fn about_z(yaw_deg: f64) -> [f64; 4] {
+    let half_yaw = 0.5 * yaw_deg.to_radians();
+    [half_yaw.cos(), 0.0, 0.0, half_yaw.sin()]
+}
+
 fn write_object(xml: &mut String, scenario: &Scenario, grasps: &[GraspSite]) -> core::fmt::Result {
     let object = &scenario.object;
     let [x, y, z] = object.size_m;
-    let half_yaw = 0.5 * object.yaw_deg.to_radians();
     // A homogeneous box.
     let inertia = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| object.mass_kg * sum / 12.0);
     writeln!(
         xml,
-        r#"    <body name="{OBJECT}" pos="{}" quat="{} 0 0 {}">
+        r#"    <body name="{OBJECT}" pos="{}" quat="{}">
       <freejoint/>
       <inertial pos="0 0 0" mass="{}" diaginertia="{}"/>
       <geom name="{OBJECT}" type="box" size="{}"/>"#,
         numbers(&object.position_m),
-        half_yaw.cos(),
-        half_yaw.sin(),
+        numbers(&about_z(object.yaw_deg)),
         object.mass_kg,
         numbers(&inertia),
         numbers(&[0.5 * x, 0.5 * y, 0.5 * z]),

@@ -3,6 +3,7 @@
 mod bad_input;
 mod command;
 mod determinism;
+mod environment;
 mod faults;
 mod leader_follower;
 mod report;

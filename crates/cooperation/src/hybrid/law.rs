@@ -102,7 +102,8 @@ impl HybridLaw {
             return Ok(());
         };
 
-        self.deal_out_errors(h_c, z_c, reference, workspace);
+        let giving_way = self.external_giving_way(h_c, reference, sticks, inputs.hands);
+        self.deal_out_errors(h_c, z_c, reference, &giving_way, workspace);
         let object_twist = self.feed_forward(reference);
         for ((((out, pose), hand), stick), (tip, lacking)) in references
             .iter_mut()
@@ -210,13 +211,52 @@ impl HybridLaw {
         }
     }
 
-    /// The errors of eq. 37, dealt out to the tips: displacements for the position axes in
-    /// `workspace.tip_twists`, wrenches that are missing on the force axes in `workspace.tip_wrenches`.
+    /// kh S (h_r − h_c) of row 0 (eqs. 34, 37): how far the object is to give way to what it lacks of the
+    /// external force, all hands with it as one body, so that no internal force comes of it.
+    ///
+    /// Against a rigid wall n hands of stiffness k, at the ends of sticks l, are as stiff as `n k` along an
+    /// axis and `n kφ + k Σ |e × l|²` about an axis e. The object's kh makes the loop gain of that the same
+    /// as a single hand's; a wall that yields lowers it. In free space there is no loop and the object moves
+    /// at a speed in proportion to the force, which is bounded: it is the speed at which it will meet the
+    /// wall.
+    fn external_giving_way(
+        &self,
+        h_c: &GeneralizedForce,
+        reference: &HybridReference,
+        sticks: &[VirtualStick],
+        hands: &[HandInput],
+    ) -> Twist<World> {
+        let Some(row) = self.rows.first().filter(|row| row.is_force != Vector6::zeros()) else {
+            return Twist::zero();
+        };
+        let HybridParameters { kz, kh, period_s, approach_limit_m_s, approach_limit_rad_s, .. } =
+            &self.parameters;
+        let mut levers = Vector3::zeros();
+        for (stick, hand) in sticks.iter().zip(hands) {
+            let l = stick.vector(&hand.pose);
+            levers += Vector3::repeat(l.norm_squared()) - l.component_mul(&l);
+        }
+        let n = self.arms() as f64;
+        let by_levers = |lever: f64| if lever > 0.0 { lever / kh.m_n } else { 0.0 };
+        let turning = levers.map(|lever| 1.0 / (n / kh.rad_nm + by_levers(lever)));
+        let lacking = row.force_error(&reference.force.external, &h_c.external);
+        let (linear, angular) = (lacking.force * (kh.m_n / n), lacking.moment.component_mul(&turning));
+        // k_z of it is what one tick brings.
+        let longest = |speed: f64| speed * period_s / kz;
+        Twist::new(
+            shortened(linear, longest(*approach_limit_m_s)).0,
+            shortened(angular, longest(*approach_limit_rad_s)).0,
+        )
+    }
+
+    /// The errors of eq. 37, dealt out to the tips: displacements for the object and for the position axes in
+    /// `workspace.tip_twists`, wrenches that are missing on internal force axes in `workspace.tip_wrenches`.
     fn deal_out_errors(
         &self,
         h_c: &GeneralizedForce,
         z_c: &GeneralizedPosition,
         reference: &HybridReference,
+        external_giving_way: &Twist<World>,
         workspace: &mut WorkspaceScratch,
     ) {
         let WorkspaceScratch {
@@ -234,7 +274,8 @@ impl HybridLaw {
             // Deviation from eqs. 37 and 39, which subtract Euler angles and map them by Ba: the rotation
             // vector from z_c to z_r is what Ba (z_r − z_c) stands for, without its singularity.
             *dz = row.position_error(&X_WA.displacement_to(&reference.position.external));
-            *dh = row.force_error(&reference.force.external, &h_c.external);
+            *dz += *external_giving_way;
+            *dh = Wrench::zero();
         }
         let h = reference.force.internal.iter().zip(&h_c.internal);
         let z = reference.position.internal.iter().zip(&z_c.internal);
@@ -251,7 +292,8 @@ impl HybridLaw {
     /// What feedback adds to a hand's reference: k_z of its tip's displacement, and k_z k_h of the wrench
     /// that it lacks. The sign holds for wrenches that hands apply TO the object.
     ///
-    /// Deviation from eqs. 34 to 37, where k_h is a number that turns h_r − h_c into a displacement δz: here
+    /// Deviation from eqs. 34 to 37, where k_h is a number that turns h_r − h_c into a displacement δz: here,
+    /// for internal rows,
     /// U deals the force error out to the hands (eq. 7), and each gives way to its share at its own origin.
     /// Through a virtual stick of length l a rotation of the tip moves the hand by l, so that along δz a grasp
     /// is up to 1 + l² k/k_φ times as stiff one way as another, and one number is too small for moments in

@@ -57,6 +57,10 @@ pub struct HybridParameters {
     pub lead_limit_m: f64,
     /// The same for its attitude \[rad\].
     pub lead_limit_rad: f64,
+    /// How fast force control of an external axis may move the object \[m/s\].
+    pub approach_limit_m_s: f64,
+    /// The same about an axis \[rad/s\].
+    pub approach_limit_rad_s: f64,
 }
 
 /// Why parameters make no law.
@@ -86,6 +90,12 @@ impl HybridParameters {
         in_range("filter_hz", self.filter_hz, "positive or infinite", self.filter_hz > 0.0)?;
         in_range("lead_limit_m", self.lead_limit_m, "positive", is_positive(self.lead_limit_m))?;
         in_range("lead_limit_rad", self.lead_limit_rad, "positive", is_positive(self.lead_limit_rad))?;
+        for (name, limit) in [
+            ("approach_limit_m_s", self.approach_limit_m_s),
+            ("approach_limit_rad_s", self.approach_limit_rad_s),
+        ] {
+            in_range(name, limit, "positive", is_positive(limit))?;
+        }
         for (name, kh) in [("kh.m_n", self.kh.m_n), ("kh.rad_nm", self.kh.rad_nm)] {
             in_range(name, kh, "finite and not negative", kh.is_finite() && kh >= 0.0)?;
         }

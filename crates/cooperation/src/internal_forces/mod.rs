@@ -15,7 +15,7 @@ use split::{Split, chain, level_order};
 use tree::GroupTree;
 
 /// The name of row 0.
-pub(crate) const OBJECT_ROW: &str = "object";
+pub const OBJECT_ROW: &str = "object";
 
 /// Which internal forces describe the team's grasp: the coefficients of C, with the inverse of [W; C].
 ///

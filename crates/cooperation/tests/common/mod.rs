@@ -54,6 +54,8 @@ pub fn parameters(internal_forces: &InternalForces) -> HybridParameters {
         filter_hz: FILTER_HZ,
         lead_limit_m: 0.1,
         lead_limit_rad: 0.2,
+        approach_limit_m_s: 1.0,
+        approach_limit_rad_s: 1.0,
     }
 }
 
@@ -71,6 +73,8 @@ pub struct ClosedLoop {
     pub force_ref: GeneralizedForce,
     pub position_ref: GeneralizedPosition,
     pub twist_ref: Twist<World>,
+    /// Nothing moves the object, as if a wall held it on all sides.
+    pub is_object_fixed: bool,
 }
 
 impl ClosedLoop {
@@ -105,6 +109,7 @@ impl ClosedLoop {
             force_ref: GeneralizedForce::zero(n),
             position_ref: GeneralizedPosition::at_grasp(X_WA, n),
             twist_ref: Twist::zero(),
+            is_object_fixed: false,
         };
         closed_loop.settle();
         closed_loop
@@ -124,6 +129,9 @@ impl ClosedLoop {
 
     /// The object moves to where all wrenches balance: Newton's method with the stiffness of its first step.
     fn settle(&mut self) {
+        if self.is_object_fixed {
+            return;
+        }
         let mut stiffness = Matrix6::zeros();
         for X_WH in self.hands.front().unwrap() {
             let lever = skew(&(X_WH.translation - self.X_WA.translation)) * STIFFNESS.n_m;
