@@ -100,8 +100,9 @@ impl Runs<'_> {
 
     /// A figure of each run's summary as a note: `peak 3.10 N`, or `peak 3.10 | 2.83 N`.
     fn note(&self, what: &str, figure: impl Fn(&ReportedRun) -> Option<f64>, unit: &str) -> String {
-        let number =
-            |run: &ReportedRun| figure(run).map_or_else(|| "−".to_owned(), |value| format!("{value:.2}"));
+        let number = |run: &ReportedRun| {
+            figure(run).map_or_else(|| "−".to_owned(), |value| format!("{value:.2}").replace('-', "−"))
+        };
         let numbers: Vec<_> = self.0.iter().map(number).collect();
         format!("{what} {} {unit}", numbers.join(" | ")).trim_end().to_owned()
     }
