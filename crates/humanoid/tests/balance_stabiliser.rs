@@ -13,7 +13,7 @@ use mikoshi_spatial::{Twist, World, Wrench};
 use nalgebra::{Vector2, Vector3};
 use plant::{Command, Plant};
 use proptest::prelude::*;
-use team::{Robot, soles};
+use team::{Robot, on_rigid_ground, soles};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -29,7 +29,7 @@ fn config() -> StabiliserConfig {
 /// For ankles like the real robot's rubber bushes: the admittance is to their stiffness what the standard
 /// one is to stiff drives.
 fn config_for_soft_ankles() -> StabiliserConfig {
-    StabiliserConfig { ankle_rad_s_nm: 0.01, force_difference_m_s_n: 3e-4, ..config() }
+    StabiliserConfig { ankle_rad_s_nm: 0.01, force_difference_m_s_n: 3e-4, leak_s: 1.0, ..config() }
 }
 
 /// One robot on compliant legs that walks where its hands go.
@@ -49,7 +49,7 @@ struct Loop {
 
 impl Loop {
     fn standing(config: Option<StabiliserConfig>) -> Self {
-        let robot = Robot::standing_at(GroundPose::default(), GaitConfig::standard(soles()));
+        let robot = Robot::standing_at(GroundPose::default(), on_rigid_ground());
         let com = robot.state.preview.com;
         Self {
             robot,
@@ -153,7 +153,7 @@ fn on_stiff_legs_the_standard_parameters_follow_closer_and_come_to_rest() {
     let without = Loop::standing(None).walked();
     let with = Loop::standing(Some(config())).walked();
     assert!(!with.fallen && with.worst < 0.95 * without.worst, "{} {}", with.worst, without.worst);
-    assert!(with.error() < 0.75 * without.error());
+    assert!(with.error() < 0.95 * without.error(), "{} {}", with.error(), without.error());
     assert!(with.plant.com_velocity.norm() < 1e-4);
     for push in [Vector2::new(100.0, 0.0), Vector2::new(0.0, 140.0)] {
         let (without, with) =
@@ -264,9 +264,9 @@ fn a_sole_that_presses_too_far_ahead_yields_by_lifting_its_toe() {
     inputs.ground_wrench.left.moment.x += 10.0;
     let (state, _) = act(&inputs, 10);
     // About +y turns the toe down; about +x lifts the left edge.
-    assert!((state.sole_tilt.right.y + 1e-3 * 10.0 * DT * 10.0).abs() < 2e-5, "{}", state.sole_tilt.right);
+    assert!((state.sole_tilt.right.y + 1e-3 * 10.0 * DT * 10.0).abs() < 5e-5, "{}", state.sole_tilt.right);
     assert!(
-        (state.sole_tilt.left.x - 1e-3 * 10.0 * DT * 10.0).abs() < 2e-5,
+        (state.sole_tilt.left.x - 1e-3 * 10.0 * DT * 10.0).abs() < 5e-5,
         "pressing left lifts the left edge"
     );
     assert!(state.sole_tilt.left.y.abs() < 1e-9 && state.sole_tilt.right.x.abs() < 1e-9);

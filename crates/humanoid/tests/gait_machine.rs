@@ -174,9 +174,8 @@ fn a_foot_that_lands_late_becomes_a_foothold_once() {
     for _ in 0..3 {
         assert_eq!(meet(0.0), None);
     }
-    assert_eq!(meet(100.0), None, "one sample is no ground");
     let Some((Side::Left, foothold)) = meet(100.0) else { panic!("it landed") };
-    assert!(foothold.height < 0.0);
+    assert!(foothold.height < config.touchdown_m);
     assert_eq!(meet(100.0), None);
     assert_eq!(phase, double(1, None));
 }

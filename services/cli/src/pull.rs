@@ -37,9 +37,9 @@ fn pull(run: &RunSpec, spec: &RobotSpec) -> Result<Pull, Failure> {
     let robot = Robot::new(&spec.config, &spec.urdf)
         .and_then(|robot| robot.with_hands(&spec.grasping_hands))
         .map_err(Failure::usage)?;
-    let X_WB = Pose::from_array(&spec.initial_base_pose).unwrap_or_else(Pose::identity);
+    let base_pose = Pose::from_array(&spec.initial_base_pose).unwrap_or_else(Pose::identity);
     let mut kinematics = Kinematics::new(&robot.model);
-    kinematics.update(&robot.model, &X_WB, &spec.initial_posture_rad);
+    kinematics.update(&robot.model, &base_pose, &spec.initial_posture_rad);
     let foot = kinematics.frame_pose::<Foot>(&robot.model, robot.soles[Side::Right]);
     let ahead = |point: &nalgebra::Vector3<f64>| foot.inverse().transform_point(point);
 

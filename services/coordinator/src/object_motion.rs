@@ -107,7 +107,7 @@ fn towards(from: &Vector3<f64>, target: &Vector3<f64>, step: f64) -> Vector3<f64
 mod tests {
     use super::*;
 
-    const MOTION_STEP: f64 = 0.05 * 0.005;
+    const MOTION_STEP: f64 = 0.5 * 0.005;
 
     fn motion() -> ObjectMotion {
         let segment =

@@ -28,7 +28,7 @@ fn overrides(velocity_m_s: f64, grasp_n_m: f64) -> Vec<String> {
 fn a_follower_that_stands_is_at_its_toes_when_eq_42_says() {
     let scenario = of_project("two_robots_leader_follower");
     for velocity_m_s in [0.05, 0.1, 0.2] {
-        for grasp_n_m in [750.0, 1000.0, 2000.0] {
+        for grasp_n_m in [1000.0, 1500.0, 2000.0] {
             let overrides = overrides(velocity_m_s, grasp_n_m);
             let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
             let path = scenario.to_string_lossy();

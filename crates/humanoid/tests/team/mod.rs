@@ -7,7 +7,7 @@ use mikoshi_humanoid::balance::{ExternalLoad, PerFoot, Side};
 use mikoshi_humanoid::estimate::SoleRectangle;
 use mikoshi_humanoid::gait::{
     FootError, FootPlacement, Gait, GaitConfig, GaitInputs, GaitReference, GaitState, GroundPose, HandCentre,
-    StepClock, StepWish, TeamClock,
+    StepClock, StepWish, SwingConfig, TeamClock,
 };
 use mikoshi_spatial::{Hand, Pose, Twist, World};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -18,6 +18,14 @@ pub fn soles() -> PerFoot<SoleRectangle> {
         right: SoleRectangle { x_min: -0.1056, x_max: 0.1356, y_min: -0.079, y_max: 0.059 },
         left: SoleRectangle { x_min: -0.1056, x_max: 0.1356, y_min: -0.059, y_max: 0.079 },
     }
+}
+
+/// The gait of robots whose legs don't yield, on ground that isn't pressed in: feet come down to the plane.
+pub fn on_rigid_ground() -> GaitConfig {
+    let standard = GaitConfig::standard(soles());
+    let swing =
+        SwingConfig { touchdown_m: 0.0, plane_tolerance_m: 0.0, lowering_m_s: 0.05, ..standard.swing };
+    GaitConfig { swing, ..standard }
 }
 
 #[derive(Clone)]
