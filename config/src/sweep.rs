@@ -115,12 +115,12 @@ pub fn load_sweep(path: &Path) -> Result<LoadedSweep, LoadConfigError> {
     let scenario = find(&sibling(path, "scenarios"), &sweep.scenario)
         .map_err(|problem| document.key_error("scenario", problem))?;
 
-    let values: [(&str, &dyn Fn(&ParameterRange) -> f64); 3] = [
-        ("key", &|range| range.draw(sweep.first_seed)),
-        ("min", &|range| range.min),
-        ("max", &|range| range.max),
-    ];
-    for (at, value_of) in values {
+    for at in ["key", "min", "max"] {
+        let value_of = |range: &ParameterRange| match at {
+            "min" => range.min,
+            "max" => range.max,
+            _ => range.draw(sweep.first_seed),
+        };
         let fixed = set.iter().map(|(key, node)| Edit::new(key, node));
         let drawn = sweep.ranges.iter().enumerate().map(|(index, range)| {
             let origin = document.locate(&format!("ranges.{index}.{at}"));

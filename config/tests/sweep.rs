@@ -53,7 +53,8 @@ fn load(text: &str) -> LoadedSweep {
 fn gives(good: &str, bad: &str, expected: &str) {
     assert_eq!(GOOD.matches(good).count(), 1, "{good:?} is to be found once");
     let (copy, path) = fixture(&GOOD.replace(good, bad));
-    let error = load_sweep(&path).err().expect("the input is bad").to_string();
+    let Err(error) = load_sweep(&path) else { panic!("the input is bad") };
+    let error = error.to_string();
     assert_eq!(error.replace(&format!("{}/", copy.path().display()), ""), expected);
 }
 
