@@ -9,6 +9,8 @@
 //! has a file that makes its scene of one run, or of two laid over each other; one renderer draws all
 //! scenes. What figures show is true; what control saw of it is at most a thin line.
 //!
+//! A sweep of many runs has a figure of its own: their figures over the parameters that they vary in.
+//!
 //! This crate knows no log file, no simulator and no control.
 
 #![allow(non_snake_case)]
@@ -20,10 +22,12 @@ mod render;
 mod run_data;
 mod scene;
 mod style;
+mod sweep;
 #[cfg(test)]
 mod tests;
 mod write;
 
 pub use error::WriteReportError;
 pub use run_data::RunData;
+pub use sweep::{SweepFigure, SweepParameter, SweepQuantity, write_sweep_figure};
 pub use write::{ReportedRun, write_report};

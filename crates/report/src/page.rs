@@ -8,8 +8,8 @@ use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary}
 
 const STYLE: &str = include_str!("page.css");
 
-/// The page. Every figure comes with its SVG.
-pub fn html(runs: &[ReportedRun], figures: &[(Figure, String)], left_out: &[LeftOut]) -> String {
+/// The page. Every figure comes with its number and its SVG.
+pub fn html(runs: &[ReportedRun], figures: &[(u32, Figure, String)], left_out: &[LeftOut]) -> String {
     let title = match runs {
         [run] => run.data.title(),
         runs => runs.iter().map(|run| run.label.as_str()).collect::<Vec<_>>().join(" and "),
@@ -24,15 +24,14 @@ pub fn html(runs: &[ReportedRun], figures: &[(Figure, String)], left_out: &[Left
         html += &section(run, runs.len() > 1);
     }
     html += "</div>\n";
-    for (figure, svg) in figures {
-        let Figure { number, caption, .. } = figure;
+    for (number, figure, svg) in figures {
         // Writing to a string can't fail.
         let _ = write!(
             html,
             "<figure id=\"figure-{number}\">\n{svg}<figcaption><b>Figure {number}.</b> {} \
              <a href=\"figure-{number}.svg\">SVG</a> <a href=\"figure-{number}.png\">PNG</a></figcaption>\n\
              </figure>\n",
-            escaped(caption)
+            escaped(&figure.caption)
         );
     }
     if !left_out.is_empty() {

@@ -4,14 +4,12 @@ use crate::style;
 use core::ops::Range;
 use plotters::style::RGBColor;
 
-/// A figure of the paper, drawn from a run.
+/// A figure.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// The paper's number.
-    pub number: u32,
-    /// What is shown.
+    /// What is shown; of a figure of the paper, its number too.
     pub title: String,
-    /// Of which run.
+    /// Of which run, or runs.
     pub subtitle: String,
     /// What is shown, in full sentences.
     pub caption: String,

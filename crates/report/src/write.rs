@@ -36,13 +36,13 @@ pub fn write_report(runs: &[ReportedRun], out: &Path) -> Result<PathBuf, WriteRe
         fs::write(&path, bytes).map_err(|source| io_error(&path, source)).map(|()| path)
     };
     let mut drawn = Vec::with_capacity(figures.len());
-    for figure in figures {
-        let name = format!("figure-{}", figure.number);
+    for (number, figure) in figures {
+        let name = format!("figure-{number}");
         let draw_error = |problem| WriteReportError::Draw { figure: name.clone(), problem };
         let svg = render::svg(&figure).map_err(draw_error)?;
         write(&format!("{name}.svg"), svg.as_bytes())?;
         write(&format!("{name}.png"), &render::png(&figure).map_err(draw_error)?)?;
-        drawn.push((figure, svg));
+        drawn.push((number, figure, svg));
     }
     write("index.html", page::html(runs, &drawn, &left_out).as_bytes())
 }

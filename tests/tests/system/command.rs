@@ -16,7 +16,7 @@ fn json(text: &str) -> Value {
 fn help_names_every_command_and_every_exit_status() {
     let said = say_mikoshi(["--help"]);
     assert_eq!(said.status, Some(0));
-    for command in ["run", "report", "plan", "status", "doctor"] {
+    for command in ["run", "sweep", "report", "plan", "status", "doctor"] {
         assert!(said.out.contains(command), "{said:#?}");
     }
     let said = say_mikoshi(["run", "--help"]);

@@ -7,3 +7,4 @@ mod environment;
 mod faults;
 mod leader_follower;
 mod report;
+mod sweep;

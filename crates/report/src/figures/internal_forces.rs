@@ -21,7 +21,6 @@ pub fn standing(runs: &Runs<'_>) -> Result<Figure, String> {
     }
     figure(
         runs,
-        14,
         "A vertical line is the start of hybrid control; the notes are the norms then and at the end.",
     )
 }
@@ -33,13 +32,12 @@ pub fn walking(runs: &Runs<'_>) -> Result<Figure, String> {
     }
     figure(
         runs,
-        18,
         "Strokes on the lower edge: a foot lands; a vertical line is the start of hybrid control. The notes \
          are the largest norm from 3 s after that start on, and the norm at the end.",
     )
 }
 
-fn figure(runs: &Runs<'_>, number: u32, notes: &str) -> Result<Figure, String> {
+fn figure(runs: &Runs<'_>, notes: &str) -> Result<Figure, String> {
     let names = runs.names(|run| run.internal.iter().map(|course| course.name.as_str()).collect());
     if names.is_empty() {
         return Err("one hand alone holds the object: there are no internal forces".to_owned());
@@ -57,7 +55,6 @@ fn figure(runs: &Runs<'_>, number: u32, notes: &str) -> Result<Figure, String> {
     }
     legend.extend(runs.legend());
     Ok(Figure {
-        number,
         title: "Internal forces and moments".to_owned(),
         subtitle: runs.subtitle(),
         caption: format!(

@@ -29,8 +29,8 @@ pub struct LeftOut {
 /// A figure, or why these runs have no data for it.
 type MakeFigure = fn(&Runs<'_>) -> Result<Figure, String>;
 
-/// Every figure that these runs have data for, and why the others are left out.
-pub fn all(runs: &Runs<'_>) -> (Vec<Figure>, Vec<LeftOut>) {
+/// Every figure that these runs have data for, by the paper's numbers, and why the others are left out.
+pub fn all(runs: &Runs<'_>) -> (Vec<(u32, Figure)>, Vec<LeftOut>) {
     let (mut drawn, mut left_out) = (Vec::new(), Vec::new());
     let makers: [(u32, MakeFigure); 6] = [
         (9, zero_moment_point::figure),
@@ -42,7 +42,10 @@ pub fn all(runs: &Runs<'_>) -> (Vec<Figure>, Vec<LeftOut>) {
     ];
     for (number, figure) in makers {
         match runs.check().and_then(|()| figure(runs)) {
-            Ok(figure) => drawn.push(figure),
+            Ok(figure) => {
+                let title = format!("Figure {number}. {}", figure.title);
+                drawn.push((number, Figure { title, ..figure }));
+            }
             Err(reason) => left_out.push(LeftOut { number, reason }),
         }
     }

@@ -34,7 +34,6 @@ pub fn standing(runs: &Runs<'_>) -> Result<Figure, String> {
         legend.push(LegendEntry::line("start of hybrid control", Stroke::thin(style::INK)));
     }
     Ok(Figure {
-        number: 12,
         title: "Position and attitude of the object".to_owned(),
         subtitle: runs.subtitle(),
         caption: format!(
@@ -71,7 +70,6 @@ pub fn walking(runs: &Runs<'_>) -> Result<Figure, String> {
         panels.extend(row);
     }
     Ok(Figure {
-        number: 15,
         title: "Position and attitude of the object".to_owned(),
         subtitle: runs.subtitle(),
         caption: format!(

@@ -67,7 +67,6 @@ pub fn figure(runs: &Runs<'_>) -> Result<Figure, String> {
         false => "Soles; nobody takes a step",
     };
     Ok(Figure {
-        number: 16,
         title: "Feet and object from above".to_owned(),
         subtitle: runs.subtitle(),
         caption: format!(

@@ -26,7 +26,6 @@ pub fn figure(runs: &Runs<'_>) -> Result<Figure, String> {
         runs.caption_end()
     );
     Ok(Figure {
-        number: 9,
         title: "Zero moment point in the support region".to_owned(),
         subtitle: runs.subtitle(),
         caption,

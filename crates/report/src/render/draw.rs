@@ -30,7 +30,7 @@ const Y_NUMBER_PX: u32 = 37;
 pub fn figure<B: DrawingBackend>(canvas: &Canvas<B>, figure: &Figure, layout: &Layout) -> Drawn<B> {
     canvas.fill(&WHITE)?;
     let title = text_style(TITLE_PX, &INK, HPos::Left, VPos::Top);
-    canvas.draw(&Text::new(format!("Figure {}. {}", figure.number, figure.title), layout.title, title))?;
+    canvas.draw(&Text::new(figure.title.clone(), layout.title, title))?;
     let subtitle = text_style(TEXT_PX, &FAINT_INK, HPos::Right, VPos::Center);
     canvas.draw(&Text::new(figure.subtitle.clone(), layout.subtitle, subtitle))?;
     legend(canvas, figure, layout.legend)?;

@@ -5,11 +5,13 @@ use crate::failure::{Failure, Status};
 use crate::interrupts::Interrupts;
 use crate::output_directory::OutputDirectory;
 use crate::print::print_out;
+use crate::sweep::figure::figure;
 use crate::sweep::jobs::Jobs;
 use crate::sweep::result::SweepResult;
 use crate::sweep::run_folder::RunFolder;
 use crate::sweep::text;
 use mikoshi_config::load_sweep;
+use mikoshi_report::write_sweep_figure;
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -39,6 +41,10 @@ pub fn sweep(arguments: &SweepArguments) -> Result<Status, Failure> {
     let result = SweepResult::of(sweep, rows);
     let json = serde_json::to_string_pretty(&result).map_err(Failure::fault)? + "\n";
     write(&out.path().join("sweep.json"), json.as_bytes())?;
+    if let Some(first) = folders.first() {
+        let figure = figure(&result, first.thresholds());
+        write_sweep_figure(&figure, out.path(), "sweep").map_err(Failure::fault)?;
+    }
     if arguments.json {
         print_out(&json);
     } else if !arguments.quiet {

@@ -52,8 +52,9 @@ impl<'a> Jobs<'a> {
         });
         loop {
             if let Some(signal) = self.interrupts.received() {
-                progress.finish_and_clear();
+                // Clearing the bar moves it to its end.
                 let finished = progress.position();
+                progress.finish_and_clear();
                 let message = format!(
                     "stopped after {finished} of {} runs: the same command goes on from there",
                     folders.len()

@@ -1,5 +1,6 @@
 //! The parts of a sweep: its runs as processes, their folders, and what they come to together.
 
+pub(crate) mod figure;
 pub(crate) mod jobs;
 pub(crate) mod result;
 pub(crate) mod run_folder;

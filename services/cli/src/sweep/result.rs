@@ -142,3 +142,52 @@ fn median(values: &mut [f64]) -> f64 {
         (_, middle) => 0.5 * (values[middle - 1] + values[middle]),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn summary(position_m: [f64; 3], margins_m: [f64; 2]) -> Value {
+        json!({
+            "object": { "position_peak_m": position_m },
+            "robots": margins_m.map(|zmp_margin_min_m| json!({ "zmp_margin_min_m": zmp_margin_min_m })),
+            "internal": [{ "peak_n": 3.0 }, { "peak_n": 5.0 }, { "peak_n": 4.0 }],
+        })
+    }
+
+    fn row(figures: Figures) -> Row {
+        Row { run: 0, seed: 0, parameters: BTreeMap::new(), passed: true, failures: vec![], figures }
+    }
+
+    #[test]
+    fn a_runs_figures_are_those_of_its_worst_axis_robot_and_internal_force() {
+        let figures = Figures::of(&summary([0.001, 0.003, 0.002], [0.04, 0.03]));
+        assert_eq!((figures.position_peak_m, figures.zmp_margin_min_m), (0.003, 0.03));
+        assert_eq!(figures.internal_peak_n, 5.0);
+    }
+
+    #[test]
+    fn a_figure_that_is_no_number_is_the_worst_and_does_not_move_the_median() {
+        let of = |margin_m| row(Figures::of(&summary([1e-3; 3], [0.05, margin_m])));
+        let rows = [of(0.04), of(0.03), of(f64::NAN), of(0.02)];
+        let worst = Figures::over(&rows, largest, smallest);
+        assert!(worst.zmp_margin_min_m.is_nan());
+        assert_eq!(Figures::over(&rows, median, median).zmp_margin_min_m, 0.03);
+        assert_eq!(Figures::over(&rows[..2], median, median).zmp_margin_min_m, 0.035);
+        assert_eq!(
+            Figures::over(&rows[..2], largest, smallest).zmp_margin_min_m,
+            0.03,
+            "the smallest is the worst"
+        );
+        assert!(
+            largest(&mut [1.0, f64::NAN]).is_nan() && largest(&mut []).is_nan() && smallest(&mut []).is_nan()
+        );
+    }
+
+    #[test]
+    fn a_sweep_that_is_cut_short_needs_its_share() {
+        assert_eq!([share(97, 100, 100), share(97, 6, 100), share(97, 50, 100)], [97, 6, 49]);
+        assert_eq!(share(0, 6, 100), 0);
+    }
+}

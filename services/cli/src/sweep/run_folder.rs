@@ -3,6 +3,7 @@
 use super::result::{Figures, Row};
 use crate::failure::Failure;
 use crate::output_directory::OutputDirectory;
+use mikoshi_config::scenario::Thresholds;
 use mikoshi_config::{LoadedScenario, Scenario, SweepRun, load_scenario};
 use serde_json::Value;
 use std::fs;
@@ -51,6 +52,11 @@ impl RunFolder {
             command.arg("--set").arg(format!("{key}={value}"));
         }
         command
+    }
+
+    /// By what the run is judged.
+    pub fn thresholds(&self) -> &Thresholds {
+        &self.scenario.scenario.thresholds
     }
 
     /// Where the run says what is wrong.

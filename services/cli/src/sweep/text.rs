@@ -76,3 +76,14 @@ fn three_digits(value: f64) -> String {
         false => text,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_told_by_three_digits() {
+        let texts = [0.0, 3.0, 5.4321, 0.000_062_34, 123_456.0, -0.5].map(three_digits);
+        assert_eq!(texts, ["0", "3", "5.43", "0.0000623", "123456", "-0.5"]);
+    }
+}
