@@ -17,6 +17,7 @@ mod decode;
 mod document;
 mod error;
 mod grasp;
+mod job;
 mod load;
 mod motion;
 mod nearest;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// When the object is first asked to move.
+    /// When the object is first asked to move; in a job, after it has been lifted.
     pub start_s: f64,
     /// Largest change of its velocity.
     #[serde(default = "default_acceleration_m_s2")]

@@ -2,6 +2,7 @@
 
 pub use crate::coordination::{Coordination, Policy};
 pub use crate::grasp::Grasp;
+pub use crate::job::Job;
 pub use crate::motion::{Motion, RandomMotion, Segment};
 pub use crate::world::{FixedBox, World};
 use serde::{Deserialize, Serialize};
@@ -39,6 +40,9 @@ pub struct Scenario {
     /// Who decides where the hands go.
     #[serde(default)]
     pub coordination: Coordination,
+    /// The whole job, from open hands to open hands; without, hands hold the object from tick 0 on.
+    #[serde(default)]
+    pub job: Option<Job>,
     /// How the object is asked to move; it stays when absent.
     #[serde(default)]
     pub motion: Option<Motion>,
@@ -79,6 +83,16 @@ impl Scenario {
     /// The tick nearest to this time.
     pub fn tick_at(&self, time_s: f64) -> u64 {
         (time_s / self.control_period_s).round() as u64
+    }
+
+    /// Whether the hybrid law is to start.
+    pub fn is_controlled(&self) -> bool {
+        self.hybrid.start_s.is_some() || self.job.is_some()
+    }
+
+    /// Whether hands hold the object at tick 0.
+    pub fn begins_closed(&self) -> bool {
+        self.job.is_none()
     }
 
     /// Number of physics steps in a tick.
@@ -125,7 +139,7 @@ pub struct Member {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hybrid {
-    /// When the law starts; never when absent.
+    /// When the law starts; never when absent. A job starts it when the hands hold.
     #[serde(default)]
     pub start_s: Option<f64>,
     /// Position gain kz (eq. 39).
@@ -298,6 +312,10 @@ pub struct Thresholds {
     pub object_attitude_peak_rad: Option<f64>,
     pub object_travel_min_m: Option<f64>,
     pub object_travel_min_rad: Option<f64>,
+    /// How far from where the job was to bring it the object may rest in the end.
+    pub object_goal_error_max_m: Option<f64>,
+    pub object_goal_error_max_rad: Option<f64>,
+    pub object_speed_end_max_m_s: Option<f64>,
     pub foot_slip_max_m: Option<f64>,
     pub joint_margin_min_rad: Option<f64>,
     pub saturated_ticks_max: Option<u64>,

@@ -366,6 +366,47 @@ fn quantities_lie_in_their_ranges() {
 }
 
 #[test]
+fn the_keys_of_a_job_lie_in_their_ranges_and_fit_each_other() {
+    const JOB: [&str; 5] =
+        ["hybrid.start_s=", "duration_s=60", "job.start_s=1", "job.draw_back_m=0.05", "job.lift_m=0.03"];
+    let root = fixture();
+    assert!(load(root.path(), &JOB).is_ok());
+    for (key, value, expected) in [
+        ("job.start_s", "-1", "a finite number from 0"),
+        ("job.draw_back_m", "0", "a finite number above 0"),
+        ("job.approach_s", "0", "a finite number above 0"),
+        ("job.grasp_s", "-0.5", "a finite number from 0"),
+        ("job.settle_s", "-1", "a finite number from 0"),
+        ("job.lift_m", "-0.03", "a finite number above 0"),
+        ("job.lift_s", "0", "a finite number above 0"),
+        ("job.creep_m", "0.03", "less than job.lift_m (0.03 m)"),
+        ("job.creep_m_s", "-1", "a finite number above 0"),
+        ("job.unload_s", "-1", "a finite number from 0"),
+        ("job.time_limit_s", "0", "a finite number above 0"),
+        ("hybrid.start_s", "0.5", "none: a job starts the law when the hands hold"),
+        ("coordination.policy", "leader-follower", "symmetry: there is a job"),
+    ] {
+        let option = format!("{key}={value}");
+        let options: Vec<&str> = JOB.into_iter().chain([option.as_str()]).collect();
+        let text = text_of(root.path(), load(root.path(), &options));
+        let first = text.lines().next().unwrap();
+        assert_eq!(first, format!("--set {option}: {key}: found {value}, expected {expected}"));
+    }
+    let short = ["duration_s=10"];
+    let options: Vec<&str> = JOB.into_iter().chain(short).collect();
+    assert_eq!(
+        text_of(root.path(), load(root.path(), &options)),
+        "--set job.start_s=1: job: found one that takes 19.5 s, expected a job that ends before the run does (10 s)"
+    );
+    file_gives(
+        SCENARIO,
+        "[physics]",
+        "[job]\nstart_s = 0.1\ndraw_back_m = 0.05\nlift_cm = 3\n\n[physics]",
+        "scenarios/lift.toml:28: job.lift_cm: unknown key; did you mean \"lift_m\"?",
+    );
+}
+
+#[test]
 fn periods_divide_each_other() {
     options_give(
         &["physics.step_s=0.002"],

@@ -50,6 +50,11 @@ fn a_run_survives_encoding() {
     run.scenario.hybrid.axes[0].control = Control::Position;
     run.scenario.hybrid.start_s = None;
     assert_eq!(RunSpec::decode(&run.encode()).unwrap(), run);
+    let job = "start_s = 1.0\ndraw_back_m = 0.05\nlift_m = 0.03";
+    run.scenario.job = Some(toml::from_str(job).unwrap());
+    run.scenario.duration_s = 30.0;
+    run.ticks = run.scenario.ticks();
+    assert_eq!(RunSpec::decode(&run.encode()).unwrap(), run);
 }
 
 #[test]

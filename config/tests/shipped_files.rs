@@ -104,3 +104,32 @@ fn every_sweep_is_called_as_its_file_and_can_be_run() {
         scenario.unwrap_or_else(|error| panic!("{error}"));
     }
 }
+
+#[test]
+fn pick_and_place_leads_from_one_pedestal_to_the_other() {
+    let scenario = load("pick_and_place", &[]).scenario;
+    let object = &scenario.object;
+    let [start, goal] = scenario.world.boxes.as_slice() else { panic!("two pedestals") };
+    for pedestal in [start, goal] {
+        let top_m = pedestal.position_m[2] + pedestal.size_m[2] / 2.0;
+        assert!((top_m - (object.position_m[2] - object.size_m[2] / 2.0)).abs() < 1e-9);
+    }
+    let motion = scenario.motion.expect("the object moves");
+    let (mut way_m, mut turn_rad) = ([0.0; 3], 0.0);
+    for segment in &motion.segments {
+        for (way, velocity) in way_m.iter_mut().zip(segment.velocity_m_s) {
+            *way += segment.duration_s * velocity;
+        }
+        turn_rad += segment.duration_s * segment.angular_velocity_rad_s[2];
+    }
+    for ((start, way), goal) in start.position_m.iter().zip(way_m).zip(goal.position_m) {
+        assert!((start + way - goal).abs() < 1e-9);
+    }
+    assert!((turn_rad - (goal.yaw_deg - start.yaw_deg).to_radians()).abs() < 1e-3);
+    // They pass between the robots of both sides: toes are 0.14 m ahead.
+    for pedestal in [start, goal] {
+        let [x, y, _] = pedestal.size_m;
+        let reach_m = 0.5 * x.hypot(y);
+        assert!(scenario.robots.iter().all(|robot| robot.x_m.abs() - 0.14 - reach_m > 0.25));
+    }
+}

@@ -26,6 +26,6 @@ pub use limits::{
 };
 pub use payloads::{
     JointCommand, ObjectTruth, PoseWire, RobotState, RobotTruth, Sensors, TeamCommand, TeamState, TwistWire,
-    WrenchWire, flag, mode,
+    WrenchWire, all_hands, flag, mode,
 };
 pub use service::ServiceId;

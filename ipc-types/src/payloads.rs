@@ -33,10 +33,31 @@ pub mod mode {
     /// Hands open and draw back.
     pub const RELEASE: u64 = 8;
 
+    /// What people call a mode.
+    pub const fn name(mode: u64) -> &'static str {
+        match mode {
+            HOLD => "hold",
+            CARRY => "carry",
+            SAFE_STOP => "safe stop",
+            APPROACH => "approach",
+            GRASP => "grasp",
+            LIFT => "lift",
+            LOWER => "lower",
+            RELEASE => "release",
+            _ => "unknown",
+        }
+    }
+
     /// Whether the hybrid law is at work.
     pub const fn is_hybrid(mode: u64) -> bool {
         matches!(mode, CARRY | LIFT | LOWER)
     }
+}
+
+/// The first `count` hands, as sets of hands travel: bit h for grasping hand h.
+pub const fn all_hands(count: usize) -> u64 {
+    let count = if count < MAX_HANDS { count } else { MAX_HANDS };
+    (1 << count) - 1
 }
 
 /// Bits of `RobotState::flags`.

@@ -8,6 +8,7 @@ use mikoshi_config::scenario::FixedBox;
 use mikoshi_humanoid::balance::PerFoot;
 use mikoshi_humanoid::estimate::SoleRectangle;
 use mikoshi_humanoid::model::FrameId;
+use mikoshi_spatial::{Hand, Object, Pose};
 use mujoco_rs::prelude::{MjModel, MjtObjBase};
 
 /// The whole world's addresses.
@@ -66,6 +67,8 @@ pub struct HandLayout {
     pub palm_body: usize,
     /// Where on the object the palm is pulled to.
     pub object_site: usize,
+    /// Where on the object it was to hold: the same without the grasp offset.
+    pub place_on_object: Pose<Object, Hand>,
     /// The weld, where there is one.
     pub equality: Option<usize>,
 }
@@ -158,13 +161,16 @@ impl Finder<'_> {
                 effort: joint.effort,
             })
         });
-        let hands = robot.hands.iter().zip(grasps).map(|(hand, grasp)| {
+        let hands = robot.hands.iter().zip(grasps).zip(&robot.spec.hand_in_object);
+        let hands = hands.map(|((hand, grasp), place)| {
             let palm_site = site(hand.frame)?;
             Ok(HandLayout {
                 sensor: force_torque(hand.sensor)?,
                 palm_site,
                 palm_body: self.0.site_bodyid()[palm_site] as usize,
                 object_site: self.id(MjtObjBase::mjOBJ_SITE, &grasp.site)?,
+                // It was found to be a pose when the robot was resolved.
+                place_on_object: Pose::from_array(place).unwrap_or_else(Pose::identity),
                 equality: self.0.name_to_id(MjtObjBase::mjOBJ_EQUALITY, &grasp.palm),
             })
         });

@@ -16,6 +16,7 @@
 
 mod error;
 mod grasp;
+mod grip;
 mod layout;
 mod logging;
 mod mjcf;

@@ -1,6 +1,7 @@
 //! The world of a run, tick by tick.
 
 use crate::grasp::{self, GraspSite, Spring};
+use crate::grip;
 use crate::layout::Layout;
 use crate::readings::{self, Noise};
 use crate::robot::Robot;
@@ -8,7 +9,7 @@ use crate::tally::{self, Contacts, Tally};
 use crate::truth;
 use crate::{BuildWorldError, LoadWorldError, StepWorldError, logging, mjcf};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, RobotTruth, Sensors};
+use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, RobotTruth, Sensors, all_hands};
 use mikoshi_spatial::Wrench;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};
 use nalgebra::Vector3;
@@ -36,6 +37,8 @@ struct State {
     tick: u64,
     /// The commands of the last tick: where interpolation starts.
     commands: Box<[JointCommand]>,
+    /// The hands of each robot that hold the object: bit h for hand h.
+    holding: Box<[u64]>,
     /// The readings of the last `depth` ticks of each robot, tick k at place k mod `depth`.
     readings: Box<[Sensors]>,
     robots: Box<[RobotTruth]>,
@@ -114,10 +117,12 @@ impl World {
         let state_size = model.state_size(INTEGRATION);
         let mut data = MjData::try_new(Box::new(model)).map_err(|error| simulator(&error))?;
 
+        let closed_hands = |hands| if scenario.begins_closed() { all_hands(hands) } else { 0 };
         let mut commands = vec![bytemuck::Zeroable::zeroed(); robots.len()].into_boxed_slice();
         let postures = run.robots.iter().map(|robot| &robot.initial_posture_rad);
         for ((layout, posture), command) in layout.robots.iter().zip(postures).zip(&mut commands) {
             let command: &mut JointCommand = command;
+            command.closed_hands = closed_hands(layout.hands.len());
             for (index, (joint, angle_rad)) in layout.joints.iter().zip(posture).enumerate() {
                 data.qpos_mut()[joint.qpos] = *angle_rad;
                 data.ctrl_mut()[joint.actuator] = *angle_rad;
@@ -128,6 +133,7 @@ impl World {
         let state = State {
             tick: 0,
             commands,
+            holding: layout.robots.iter().map(|robot| closed_hands(robot.hands.len())).collect(),
             readings: vec![bytemuck::Zeroable::zeroed(); robots.len() * depth].into(),
             robots: vec![bytemuck::Zeroable::zeroed(); robots.len()].into(),
             object: bytemuck::Zeroable::zeroed(),
@@ -196,6 +202,7 @@ impl World {
         if !values.into_iter().all(|value| value.is_finite()) {
             return Err(StepWorldError::NotFinite);
         }
+        grip::close_and_open(&mut self.data, &self.layout, commands, &mut self.state.holding);
         self.scratch.tallies.fill(Tally::empty());
         self.scratch.contacts = Contacts::default();
         for substep in 1..=self.substeps {
@@ -225,10 +232,11 @@ impl World {
 
     /// Bytes of a checkpoint.
     pub fn checkpoint_size(&self) -> usize {
-        let State { tick, commands, readings, robots, object } = &self.state;
+        let State { tick, commands, holding, readings, robots, object } = &self.state;
         size_of_val(&*self.scratch.simulator_state)
             + size_of_val(tick)
             + size_of_val(&**commands)
+            + size_of_val(&**holding)
             + size_of_val(&**readings)
             + size_of_val(&**robots)
             + size_of_val(object)
@@ -309,9 +317,11 @@ impl World {
         let Some(spring) = self.spring else { return };
         let object = self.layout.object.body;
         self.data.xfrc_applied_mut()[object] = [0.0; 6];
-        for (layout, wrenches) in self.layout.robots.iter().zip(&mut self.scratch.hand_wrenches) {
-            for (hand, wrench) in layout.hands.iter().zip(wrenches) {
-                *wrench = spring.wrench_on_object(&self.data, hand);
+        let robots = self.layout.robots.iter().zip(&self.state.holding);
+        for ((layout, holding), wrenches) in robots.zip(&mut self.scratch.hand_wrenches) {
+            for (index, (hand, wrench)) in layout.hands.iter().zip(wrenches).enumerate() {
+                let holds = holding & 1 << index != 0;
+                *wrench = if holds { spring.wrench_on_object(&self.data, hand) } else { Wrench::zero() };
                 let palm = Vector3::from(self.data.site_xpos()[hand.palm_site]);
                 // The simulator wants forces at centres of mass.
                 let at_com = |body: usize, wrench: &Wrench<mikoshi_spatial::World>| {
@@ -346,11 +356,13 @@ impl World {
         let place = tick as usize % self.depth;
         let rings = self.state.readings.chunks_exact_mut(self.depth);
         let robots = self.layout.robots.iter().zip(&self.scratch.tallies).zip(&self.scratch.hand_wrenches);
-        for ((((layout, tally), wrenches), ring), (truth, noise)) in
-            robots.zip(rings).zip(self.state.robots.iter_mut().zip(&self.noise))
+        let holding = self.state.holding.iter();
+        for (((((layout, tally), wrenches), ring), holding), (truth, noise)) in
+            robots.zip(rings).zip(holding).zip(self.state.robots.iter_mut().zip(&self.noise))
         {
             let reading = &mut ring[place];
             readings::read(&self.data, layout, tally, reading);
+            reading.holding_hands = *holding;
             if let Some(noise) = noise {
                 noise.add(tick, reading);
             }
@@ -379,11 +391,12 @@ impl World {
 
 impl State {
     /// All parts of a checkpoint as bytes, the simulator's first.
-    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 6] {
+    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 7] {
         [
             bytemuck::cast_slice_mut(simulator),
             bytemuck::bytes_of_mut(&mut self.tick),
             bytemuck::cast_slice_mut(&mut self.commands),
+            bytemuck::cast_slice_mut(&mut self.holding),
             bytemuck::cast_slice_mut(&mut self.readings),
             bytemuck::cast_slice_mut(&mut self.robots),
             bytemuck::bytes_of_mut(&mut self.object),

@@ -2,7 +2,7 @@
 
 use super::checks::{Checks, Violation};
 use crate::robot::RobotConfig;
-use crate::scenario::{Control, Grasp, InternalForces, Member, Motion, Scenario};
+use crate::scenario::{Control, Grasp, InternalForces, Job, Member, Motion, Policy, Scenario};
 use mikoshi_ipc_types::{MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS};
 use std::collections::BTreeSet;
 
@@ -44,6 +44,9 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     grasp(&mut checks, &scenario.grasp);
     let arms = team(&mut checks, &scenario.robots, configs);
     hybrid(&mut checks, scenario, arms);
+    if let Some(of_team) = &scenario.job {
+        job(&mut checks, of_team, scenario);
+    }
     let coordination = &scenario.coordination;
     checks.positive("coordination.detection_n", coordination.detection_n);
     checks.not_negative("coordination.delay_s", coordination.delay_s);
@@ -211,12 +214,37 @@ fn hybrid(checks: &mut Checks, scenario: &Scenario, arms: Option<usize>) {
     }
 }
 
+fn job(checks: &mut Checks, job: &Job, scenario: &Scenario) {
+    checks.not_negative("job.start_s", job.start_s);
+    checks.positive("job.draw_back_m", job.draw_back_m);
+    checks.positive("job.approach_s", job.approach_s);
+    checks.not_negative("job.grasp_s", job.grasp_s);
+    checks.not_negative("job.settle_s", job.settle_s);
+    checks.positive("job.lift_m", job.lift_m);
+    checks.positive("job.lift_s", job.lift_s);
+    checks.positive("job.creep_m", job.creep_m);
+    let expected = format!("less than job.lift_m ({} m)", job.lift_m);
+    checks.require(job.creep_m < job.lift_m, "job.creep_m", job.creep_m, expected);
+    checks.positive("job.creep_m_s", job.creep_m_s);
+    checks.not_negative("job.unload_s", job.unload_s);
+    checks.positive("job.time_limit_s", job.time_limit_s);
+    let carry_s = scenario.motion.as_ref().map_or(0.0, Motion::end_s);
+    let (end_s, duration_s) = (job.shortest_s() + carry_s, scenario.duration_s);
+    let expected = format!("a job that ends before the run does ({duration_s} s)");
+    checks.require(end_s < duration_s, "job", format_args!("one that takes {end_s:.1} s"), expected);
+    if let Some(start_s) = scenario.hybrid.start_s {
+        checks.require(false, "hybrid.start_s", start_s, "none: a job starts the law when the hands hold");
+    }
+    let is_by_symmetry = scenario.coordination.policy == Policy::Symmetry;
+    checks.require(is_by_symmetry, "coordination.policy", "leader-follower", "symmetry: there is a job");
+}
+
 fn motion(checks: &mut Checks, motion: &Motion, scenario: &Scenario) {
     checks.not_negative("motion.start_s", motion.start_s);
     if let Some(start_s) = scenario.hybrid.start_s {
         let expected = format!("a time from hybrid.start_s ({start_s} s) on");
         checks.require(motion.start_s >= start_s, "motion.start_s", motion.start_s, expected);
-    } else {
+    } else if scenario.job.is_none() {
         let expected = "none, or a time: without the hybrid law nothing moves the object";
         checks.require(false, "hybrid.start_s", "motion without it", expected);
     }
@@ -261,6 +289,9 @@ fn thresholds(checks: &mut Checks, scenario: &Scenario) {
         ("object_attitude_peak_rad", limits.object_attitude_peak_rad),
         ("object_travel_min_m", limits.object_travel_min_m),
         ("object_travel_min_rad", limits.object_travel_min_rad),
+        ("object_goal_error_max_m", limits.object_goal_error_max_m),
+        ("object_goal_error_max_rad", limits.object_goal_error_max_rad),
+        ("object_speed_end_max_m_s", limits.object_speed_end_max_m_s),
         ("foot_slip_max_m", limits.foot_slip_max_m),
         ("joint_margin_min_rad", limits.joint_margin_min_rad),
         ("saturated_share_max", limits.saturated_share_max),

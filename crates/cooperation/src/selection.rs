@@ -14,6 +14,11 @@ pub enum Axis {
     Yaw,
 }
 
+impl Axis {
+    /// All six.
+    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
+}
+
 /// What is controlled along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {

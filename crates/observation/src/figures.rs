@@ -1,19 +1,16 @@
 //! The figures of a run, gathered tick by tick from ground truth.
 
 use crate::canonical::Observation;
-use crate::summary::{InternalSummary, ObjectSummary, RobotSummary};
+use crate::internal::{InternalFigures, raise};
+use crate::summary::{InternalSummary, ModeSummary, ObjectSummary, RobotSummary};
 use crate::truth::{FootTracker, ObjectTracker, TrackedObject};
-use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, ObjectTruth, RobotState, RobotTruth, TeamState, mode};
-use mikoshi_spatial::{Object, Pose, World, Wrench};
-use nalgebra::Vector2;
+use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, ObjectTruth, RobotState, RobotTruth, mode};
+use mikoshi_spatial::{Object, Pose, World};
+use nalgebra::{Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// How long after its start the hybrid law is judged.
-const JUDGED_AFTER_S: f64 = 3.0;
 /// Length of the windows whose largest value counts.
-const WINDOW_S: f64 = 0.2;
-/// Length of the window in which measured and true internal forces are compared.
-const COMPARED_S: f64 = 1.0;
+pub(crate) const WINDOW_S: f64 = 0.2;
 /// A zero moment point this near to the edge of the support is at the edge.
 const EDGE_M: f64 = 0.005;
 /// A drift is not divided by less.
@@ -49,8 +46,10 @@ pub struct ObservedRun {
     pub control_period_s: f64,
     /// Number of ticks.
     pub ticks: u64,
-    /// When the hybrid law starts, if it does.
-    pub hybrid_start_tick: Option<u64>,
+    /// Whether the hybrid law is to start.
+    pub is_controlled: bool,
+    /// Where the object is to rest in the end, if it is to be set down.
+    pub X_WBody_goal: Option<Pose<World, Object>>,
     /// The robots.
     pub robots: Vec<ObservedRobot>,
     /// Name and coefficients of each internal force (a row of C).
@@ -61,10 +60,9 @@ pub struct ObservedRun {
 #[derive(Clone, Debug)]
 pub struct Figures {
     run: ObservedRun,
-    internal: Vec<InternalSummary>,
+    internal: InternalFigures,
     tracker: ObjectTracker,
-    end_samples: u64,
-    measurement_error: (f64, f64),
+    modes: Vec<(u64, u64)>,
     object: ObjectFigures,
     robots: Vec<RobotFigures>,
     unintended_contact_ticks: u64,
@@ -82,23 +80,18 @@ pub struct JudgedFigures {
     pub fell: Vec<String>,
     pub unintended_contact_ticks: u64,
     pub drift_between_robots_m: f64,
+    pub modes: Vec<ModeSummary>,
 }
 
 impl Figures {
     /// Nothing observed yet.
     pub fn new(run: ObservedRun) -> Self {
-        let internal = run
-            .internal_rows
-            .iter()
-            .map(|(name, _)| InternalSummary { name: name.clone(), ..InternalSummary::default() })
-            .collect();
         let robots = run.robots.iter().map(RobotFigures::new).collect();
         Self {
             tracker: ObjectTracker::new(&run),
+            internal: InternalFigures::new(&run),
             run,
-            internal,
-            end_samples: 0,
-            measurement_error: (0.0, 0.0),
+            modes: vec![],
             object: ObjectFigures::default(),
             robots,
             unintended_contact_ticks: 0,
@@ -115,7 +108,10 @@ impl Figures {
             self.object.observe_end(&observation.object_truth.payload);
         }
         let team_state = &observation.team_state.payload;
-        self.observe_internal_forces(observation.tick(), &object.internal, team_state);
+        self.internal.observe(observation.tick(), object.internal, team_state);
+        if self.modes.last().is_none_or(|(mode, _)| *mode != team_state.team_mode) {
+            self.modes.push((team_state.team_mode, observation.tick()));
+        }
         let seen = observation.robot_truth.iter().zip(&observation.robot_state);
         for (figures, (truth, state)) in self.robots.iter_mut().zip(seen) {
             figures.observe(&truth.payload, &state.payload);
@@ -132,46 +128,6 @@ impl Figures {
         tick + window >= self.run.ticks
     }
 
-    fn observe_internal_forces(&mut self, tick: u64, forces: &[Wrench<Object>], team_state: &TeamState) {
-        let seconds = |s: f64| (s / self.run.control_period_s).round() as u64;
-        let start = self.run.hybrid_start_tick.unwrap_or(0);
-        let judged = start + seconds(JUDGED_AFTER_S)..=start + seconds(JUDGED_AFTER_S + WINDOW_S);
-        let is_end = self.is_end(tick);
-        let is_compared =
-            tick + seconds(COMPARED_S) >= self.run.ticks && mode::is_hybrid(team_state.team_mode);
-        if is_end {
-            self.end_samples += 1;
-        }
-        for (row, (summary, force_A)) in self.internal.iter_mut().zip(forces).enumerate() {
-            let (force_n, moment_nm) = (force_A.force.norm(), force_A.moment.norm());
-            let raise = |largest: &mut f64, value: f64| *largest = largest.max(value);
-            if tick >= *judged.start() {
-                raise(&mut summary.peak_n, force_n);
-                raise(&mut summary.peak_nm, moment_nm);
-            }
-            if tick == start {
-                (summary.start_n, summary.start_nm) = (force_n, moment_nm);
-            }
-            if judged.contains(&tick) {
-                raise(&mut summary.after_3s_n, force_n);
-                raise(&mut summary.after_3s_nm, moment_nm);
-            }
-            if is_end {
-                raise(&mut summary.end_n, force_n);
-                raise(&mut summary.end_nm, moment_nm);
-                for (mean, value) in summary.end_mean.iter_mut().zip(force_A.to_array()) {
-                    *mean += value;
-                }
-            }
-            if is_compared {
-                let measured = team_state.generalized_force[row + 1];
-                let error = Wrench::<Object>::from_array(&measured) - *force_A;
-                raise(&mut self.measurement_error.0, error.force.norm());
-                raise(&mut self.measurement_error.1, error.moment.norm());
-            }
-        }
-    }
-
     /// The largest difference between two robots' drifts.
     fn drift_between_robots_m(&self) -> f64 {
         let drifts = || self.robots.iter().map(RobotFigures::drift_m);
@@ -179,20 +135,27 @@ impl Figures {
     }
 
     /// The figures of all ticks observed.
-    pub fn finish(mut self) -> JudgedFigures {
-        for summary in &mut self.internal {
-            summary.end_mean = summary.end_mean.map(|sum| sum / self.end_samples.max(1) as f64);
-        }
+    pub fn finish(self) -> JudgedFigures {
+        let period_s = self.run.control_period_s;
+        let (measurement_error_n, measurement_error_nm) = self.internal.measurement_error();
         let drift_between_robots_m = self.drift_between_robots_m();
         let robots = self.run.robots.iter().zip(&self.robots);
         JudgedFigures {
-            object: self.object.finish(self.tracker.X_BodyA()),
-            internal: self.internal,
-            internal_measurement_error_n: self.measurement_error.0,
-            internal_measurement_error_nm: self.measurement_error.1,
+            object: self.object.finish(&self.run, self.tracker.X_BodyA()),
+            internal_measurement_error_n: measurement_error_n,
+            internal_measurement_error_nm: measurement_error_nm,
             fell: robots.clone().filter(|(_, f)| f.has_fallen).map(|(robot, _)| robot.name.clone()).collect(),
-            robots: robots.map(|(robot, figures)| figures.finish(robot, self.run.control_period_s)).collect(),
+            robots: robots.map(|(robot, figures)| figures.finish(robot, period_s)).collect(),
             drift_between_robots_m,
+            modes: self
+                .modes
+                .iter()
+                .map(|(mode, tick)| ModeSummary {
+                    mode: mode::name(*mode).to_owned(),
+                    start_s: *tick as f64 * period_s,
+                })
+                .collect(),
+            internal: self.internal.finish(),
             unintended_contact_ticks: self.unintended_contact_ticks,
         }
     }
@@ -207,6 +170,7 @@ struct ObjectFigures {
     peaks: [f64; 6],
     end_samples: u64,
     support_force_end_sum_n: [f64; 3],
+    speed_end_m_s: f64,
 }
 
 impl ObjectFigures {
@@ -229,9 +193,11 @@ impl ObjectFigures {
         for (sum, force) in self.support_force_end_sum_n.iter_mut().zip(truth.support_wrench) {
             *sum += force;
         }
+        let [x, y, z, ..] = truth.twist;
+        raise(&mut self.speed_end_m_s, Vector3::new(x, y, z).norm());
     }
 
-    fn finish(&self, X_BodyA: Option<&Pose<Object, Object>>) -> ObjectSummary {
+    fn finish(&self, run: &ObservedRun, X_BodyA: Option<&Pose<Object, Object>>) -> ObjectSummary {
         let rms = self.squares.map(|sum| (sum / self.samples.max(1) as f64).sqrt());
         let travel = match (&self.first, &self.last) {
             (Some(first), Some(last)) => first.displacement_to(last).to_array(),
@@ -241,6 +207,8 @@ impl ObjectFigures {
         let ((position_rms_m, attitude_rms_rad), (position_peak_m, attitude_peak_rad)) =
             (split(rms), split(self.peaks));
         let (travel_m, travel_rad) = split(travel);
+        let goal_error = self.last.zip(run.X_WBody_goal).map(|(last, goal)| goal.displacement_to(&last));
+        let (goal_error_m, goal_error_rad) = goal_error.map(|error| split(error.to_array())).unzip();
         ObjectSummary {
             position_rms_m,
             position_peak_m,
@@ -248,6 +216,9 @@ impl ObjectFigures {
             attitude_peak_rad,
             travel_m,
             travel_rad,
+            goal_error_m,
+            goal_error_rad,
+            speed_end_m_s: self.speed_end_m_s,
             support_force_end_n: self.support_force_end_sum_n.map(|sum| sum / self.end_samples.max(1) as f64),
             frame_offset_m: X_BodyA.map_or([0.0; 3], |X_BodyA| X_BodyA.translation.into()),
         }

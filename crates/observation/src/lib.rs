@@ -6,6 +6,7 @@
 
 mod canonical;
 mod figures;
+mod internal;
 mod log;
 mod reader;
 mod summary;
@@ -16,6 +17,6 @@ pub use canonical::{LogHash, Observation, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError};
-pub use summary::{Fault, InternalSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
+pub use summary::{Fault, InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
 pub use tap::TeamTap;
 pub use truth::{FootTracker, ObjectTracker, TrackedObject, is_loaded};

@@ -21,6 +21,8 @@ pub struct Summary {
     pub log_hash: String,
     /// Names of the robots that fell.
     pub fell: Vec<String>,
+    /// The team's modes, one after the other.
+    pub modes: Vec<ModeSummary>,
     pub object: ObjectSummary,
     pub internal: Vec<InternalSummary>,
     /// Largest difference between the internal forces that control saw and the true ones over the last
@@ -37,6 +39,14 @@ pub struct Summary {
     pub swaps: Vec<Swap>,
 }
 
+/// A mode of the team, and when it began.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct ModeSummary {
+    pub mode: String,
+    pub start_s: f64,
+}
+
 /// How well Σa, as it was fixed to the object when the hybrid law started, kept to its reference from then
 /// on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,6 +60,11 @@ pub struct ObjectSummary {
     pub travel_m: [f64; 3],
     /// True rotation over the whole run.
     pub travel_rad: [f64; 3],
+    /// Where the object rests in the end against where the job was to set it down; none without a job.
+    pub goal_error_m: Option<[f64; 3]>,
+    pub goal_error_rad: Option<[f64; 3]>,
+    /// Its largest speed over the last 0.2 s.
+    pub speed_end_m_s: f64,
     /// Mean force of the world's fixed boxes on the object over the last 0.2 s, in world axes.
     pub support_force_end_n: [f64; 3],
     /// Where Σa, the frame that control created on the object when it started, lies in the object's body:
@@ -71,7 +86,7 @@ pub struct InternalSummary {
     /// Largest from 3.0 to 3.2 s after the start.
     pub after_3s_n: f64,
     pub after_3s_nm: f64,
-    /// Largest of the last 0.2 s.
+    /// Largest of the last 0.2 s of the run, or of the hybrid law where it ends before.
     pub end_n: f64,
     pub end_nm: f64,
     /// Mean wrench of the last 0.2 s in the object's axes.

@@ -103,7 +103,7 @@ impl ObjectTracker {
         Self {
             hands: run.robots.iter().map(|robot| robot.hands).collect(),
             c: run.internal_rows.iter().map(|(_, coefficients)| coefficients.clone()).collect(),
-            is_uncontrolled: run.hybrid_start_tick.is_none(),
+            is_uncontrolled: !run.is_controlled,
             X_BodyA: None,
             sticks: Vec::new(),
         }

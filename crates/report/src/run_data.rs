@@ -1,7 +1,7 @@
 //! What the figures show of a run: its true course, tick by tick.
 
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{MAX_FEET, RobotTruth};
+use mikoshi_ipc_types::{MAX_FEET, RobotTruth, mode};
 use mikoshi_observation::{FootTracker, ObjectTracker, Observation, ObservedRun, is_loaded};
 use mikoshi_spatial::{Foot, Object, Pose, World, Wrench};
 use nalgebra::{Rotation2, Vector2, Vector3};
@@ -13,6 +13,8 @@ pub struct RunData {
     pub(crate) scenario: String,
     pub(crate) seed: u64,
     pub(crate) period_s: f64,
+    is_controlled: bool,
+    /// When the hybrid law started, once it has.
     pub(crate) hybrid_start_s: Option<f64>,
     /// When each tick began.
     pub(crate) time_s: Vec<f64>,
@@ -106,7 +108,8 @@ impl RunData {
             scenario: scenario.name.clone(),
             seed: scenario.seed,
             period_s: scenario.control_period_s,
-            hybrid_start_s: scenario.hybrid.start_s,
+            is_controlled: observed.is_controlled,
+            hybrid_start_s: None,
             time_s: vec![],
             object: ObjectCourse { size_m: scenario.object.size_m, ..ObjectCourse::default() },
             internal: internal.collect(),
@@ -121,9 +124,9 @@ impl RunData {
         format!("{}, seed {}", self.scenario, self.seed)
     }
 
-    /// Whether hybrid control ever starts.
+    /// Whether hybrid control is to start.
     pub(crate) fn is_controlled(&self) -> bool {
-        self.hybrid_start_s.is_some()
+        self.is_controlled
     }
 
     /// When the last tick ended.
@@ -137,7 +140,11 @@ impl RunData {
             return;
         };
         let tick = self.time_s.len();
-        self.time_s.push(observation.tick() as f64 * self.period_s);
+        let time_s = observation.tick() as f64 * self.period_s;
+        self.time_s.push(time_s);
+        if mode::is_hybrid(observation.team_state.payload.team_mode) {
+            self.hybrid_start_s.get_or_insert(time_s);
+        }
         self.object.X_WBody.push(object.X_WBody);
         // Where nothing is controlled there is nothing to follow.
         let X_WA_ref = object.X_WA_ref.filter(|_| self.is_controlled());

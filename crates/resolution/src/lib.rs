@@ -18,7 +18,7 @@ pub use schedule::tick_schedule;
 use mikoshi_config::{LoadConfigError, LoadedScenario, RunSpec};
 use robot::{Models, resolve_robot};
 
-/// The run of a scenario: every robot stands and holds at tick 0.
+/// The run of a scenario: every robot stands at tick 0, and holds, or where there is a job is about to.
 ///
 /// # Errors
 /// A URDF or a robot's configuration can't be used, or a grasp is out of reach: with file and line.

@@ -78,14 +78,20 @@ pub(crate) fn resolve_robot(
         hand_in_object.push(X_AH.to_array());
     }
 
-    let targets = IkTargets {
+    let mut targets = IkTargets {
         stance: Side::Right,
         feet: PerFoot::from_fn(|side| X_WG * standing_foot(side, config.foot_spacing_m)),
         com: X_WG.transform_point(&Vector3::new(0.0, 0.0, config.com_height_m)),
         waist_attitude: X_WG.rotation,
         hands,
     };
-    let settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
+    let mut settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
+    if let Some(job) = &scenario.scenario.job {
+        for hand in targets.hands.iter_mut().flatten() {
+            *hand = *hand * drawn_back(job.draw_back_m);
+        }
+        settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
+    }
     Ok(RobotSpec {
         member: member.clone(),
         config: config.clone(),
@@ -135,6 +141,11 @@ fn carry_pose(hand: &HandConfig) -> Pose<Ground, Hand> {
     // The configuration's rotation is checked to be one, to the digits that people write.
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix));
     Pose::new(Vector3::from(hand.carry_position_m), rotation)
+}
+
+/// Where an open hand begins, from where it will hold: the palm's −z points to the object.
+fn drawn_back(by_m: f64) -> Pose<Hand, Hand> {
+    Pose::new(Vector3::new(0.0, 0.0, by_m), UnitQuaternion::identity())
 }
 
 fn standing_foot(side: Side, spacing_m: f64) -> Pose<Ground, Foot> {

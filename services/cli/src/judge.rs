@@ -3,7 +3,8 @@
 use mikoshi_config::Scenario;
 use mikoshi_config::scenario::{AxisControl, Control, Thresholds};
 use mikoshi_cooperation::OBJECT_ROW;
-use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
+use mikoshi_ipc_types::mode;
+use mikoshi_observation::{InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary};
 
 const GRAVITY_M_S2: f64 = 9.81;
 /// How long after its start the hybrid law is judged.
@@ -33,8 +34,7 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
     for axis in &scenario.hybrid.axes {
         judge_axis(&mut judge, limits, axis, rows, &external_force_n);
     }
-    let (when, observed) =
-        ("3 s after the start", is_judged_after_3s(scenario, summary.sim_time_s).then_some(rows));
+    let (when, observed) = ("3 s after the start", is_judged_after_3s(scenario, summary).then_some(rows));
     judge.internal_forces(observed, when, "N", limits.internal_after_3s_n, |row| row.after_3s_n);
     judge.internal_forces(observed, when, "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm);
     judge.internal_forces(observed, "from 3 s on", "N", limits.internal_peak_n, |row| row.peak_n);
@@ -42,6 +42,9 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
     judge.internal_forces(Some(rows), "at the end", "Nm", limits.internal_end_nm, |row| row.end_nm);
 
     judge_object(&mut judge, scenario, &summary.object);
+    if scenario.job.is_some() {
+        judge_job(&mut judge, &summary.modes);
+    }
     for robot in &summary.robots {
         judge_robot(&mut judge, scenario, robot, summary.ticks);
     }
@@ -76,6 +79,31 @@ fn judge_object(judge: &mut Judge, scenario: &Scenario, object: &ObjectSummary) 
     }
     if let Some(limit) = limits.object_travel_min_rad {
         judge.at_least("turn of the object", norm(object.travel_rad), limit, "rad");
+    }
+    judge_rest(judge, limits, object);
+}
+
+/// Where the object comes to rest in the end; where nobody knows where it should, that is not met.
+fn judge_rest(judge: &mut Judge, limits: &Thresholds, object: &ObjectSummary) {
+    let norm = |values: Option<[f64; 3]>| values.map_or(f64::NAN, |[x, y, z]| x.hypot(y).hypot(z));
+    for (what, value, limit, unit) in [
+        (
+            "distance of the object from its goal",
+            norm(object.goal_error_m),
+            limits.object_goal_error_max_m,
+            "m",
+        ),
+        (
+            "angle of the object from its goal",
+            norm(object.goal_error_rad),
+            limits.object_goal_error_max_rad,
+            "rad",
+        ),
+        ("speed of the object at the end", object.speed_end_m_s, limits.object_speed_end_max_m_s, "m/s"),
+    ] {
+        if let Some(limit) = limit {
+            judge.at_most(what, value, limit, unit);
+        }
     }
 }
 
@@ -120,8 +148,28 @@ fn external_force_end(scenario: &Scenario, object: &ObjectSummary) -> [f64; 3] {
 }
 
 /// Whether the run was long enough to be judged [`JUDGED_AFTER_S`] after its hybrid law started.
-pub fn is_judged_after_3s(scenario: &Scenario, sim_time_s: f64) -> bool {
-    scenario.hybrid.start_s.unwrap_or(0.0) + JUDGED_AFTER_S < sim_time_s
+pub fn is_judged_after_3s(scenario: &Scenario, summary: &Summary) -> bool {
+    let start_s = if scenario.is_controlled() { hybrid_start_s(&summary.modes) } else { Some(0.0) };
+    start_s.is_some_and(|start_s| start_s + JUDGED_AFTER_S < summary.sim_time_s)
+}
+
+fn hybrid_start_s(modes: &[ModeSummary]) -> Option<f64> {
+    let is_hybrid = |name: &str| [mode::LIFT, mode::CARRY, mode::LOWER].map(mode::name).contains(&name);
+    modes.iter().find(|entry| is_hybrid(&entry.mode)).map(|entry| entry.start_s)
+}
+
+/// A job is done when the hands that let go have drawn back, and the team stands again.
+fn judge_job(judge: &mut Judge, modes: &[ModeSummary]) {
+    let names: Vec<&str> = modes.iter().map(|entry| entry.mode.as_str()).collect();
+    match names.as_slice() {
+        [.., before, last] if *before == mode::name(mode::RELEASE) && *last == mode::name(mode::HOLD) => {}
+        [.., during, last] if *last == mode::name(mode::SAFE_STOP) => {
+            let stop_s = modes.last().map_or(0.0, |entry| entry.start_s);
+            judge.fail(format!("the job failed: the team stopped after {stop_s:.2} s, in {during}"));
+        }
+        [.., last] => judge.fail(format!("the job is not done: the run ends in {last}")),
+        [] => judge.fail("the job is not done: no tick was observed".to_owned()),
+    }
 }
 
 fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary, ticks: u64) {
@@ -263,6 +311,45 @@ mod tests {
         let mut judge = Judge::default();
         judge_axis(&mut judge, &limits, &yaw, &rows, &external);
         assert_eq!(judge.failures.len(), 1);
+    }
+
+    #[test]
+    fn a_job_is_done_when_hands_have_let_go_and_the_team_stands() {
+        let failures = |names: &[&str]| {
+            let entry = |(index, name): (usize, &&str)| ModeSummary {
+                mode: (*name).to_owned(),
+                start_s: index as f64,
+            };
+            let modes: Vec<ModeSummary> = names.iter().enumerate().map(entry).collect();
+            let mut judge = Judge::default();
+            judge_job(&mut judge, &modes);
+            judge.failures
+        };
+        let whole = ["hold", "approach", "grasp", "lift", "carry", "lower", "release", "hold"];
+        assert_eq!(failures(&whole), [""; 0]);
+        assert_eq!(failures(&whole[..5]), ["the job is not done: the run ends in carry"]);
+        assert_eq!(failures(&whole[..1]), ["the job is not done: the run ends in hold"]);
+        assert_eq!(
+            failures(&["hold", "approach", "grasp", "safe stop"]),
+            ["the job failed: the team stopped after 3.00 s, in grasp"]
+        );
+        assert_eq!(failures(&[]).len(), 1);
+    }
+
+    #[test]
+    fn an_object_whose_goal_nobody_knows_has_not_reached_it() {
+        let limits = Thresholds { object_goal_error_max_m: Some(0.005), ..Thresholds::default() };
+        let failures = |goal_error_m| {
+            let mut judge = Judge::default();
+            judge_rest(&mut judge, &limits, &ObjectSummary { goal_error_m, ..ObjectSummary::default() });
+            judge.failures
+        };
+        assert_eq!(failures(Some([0.003, -0.003, 0.002])), [""; 0]);
+        assert_eq!(
+            failures(Some([0.004, -0.003, 0.002])),
+            ["distance of the object from its goal: 0.005385 m, expected at most 0.005 m"]
+        );
+        assert_eq!(failures(None).len(), 1);
     }
 
     #[test]

@@ -81,6 +81,7 @@ impl RunObserver {
             failures: vec![],
             log_hash: self.hash.to_hex(),
             fell: figures.fell,
+            modes: figures.modes,
             object: figures.object,
             internal: figures.internal,
             internal_measurement_error_n: figures.internal_measurement_error_n,

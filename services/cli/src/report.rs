@@ -56,7 +56,7 @@ pub fn report(scenario: &Scenario, summary: &Summary, out: &Path) -> String {
 
 fn internal_table(scenario: &Scenario, summary: &Summary) -> String {
     let titles = ["internal force", "start N", "Nm", "3 s after N", "Nm", "end N", "Nm", "peak N", "Nm"];
-    let is_judged_after_3s = is_judged_after_3s(scenario, summary.sim_time_s);
+    let is_judged_after_3s = is_judged_after_3s(scenario, summary);
     let cells = |row: &InternalSummary| {
         let figures = [
             (row.start_n, row.start_nm, true),

@@ -61,8 +61,28 @@ pub fn build_internal_forces(run: &RunSpec) -> Result<InternalForces, BuildCoord
 /// The hybrid law with the scenario's gains and selection.
 pub fn build_hybrid_law(run: &RunSpec) -> Result<HybridLaw, BuildCoordinatorError> {
     let internal_forces = build_internal_forces(run)?;
-    let hybrid = &run.scenario.hybrid;
     let selection = build_selection(&run.scenario, &internal_forces)?;
+    law_with(run, internal_forces, selection)
+}
+
+/// The law for an object that rests on something: the same, with the object under force control along all
+/// axes.
+pub(crate) fn build_resting_law(run: &RunSpec) -> Result<HybridLaw, BuildCoordinatorError> {
+    let internal_forces = build_internal_forces(run)?;
+    let mut selection = build_selection(&run.scenario, &internal_forces)?;
+    for axis in cooperation::Axis::ALL {
+        let selected = selection.select(0, axis, cooperation::Control::Force);
+        debug_assert!(selected.is_some(), "row 0 is the object");
+    }
+    law_with(run, internal_forces, selection)
+}
+
+fn law_with(
+    run: &RunSpec,
+    internal_forces: InternalForces,
+    selection: Selection,
+) -> Result<HybridLaw, BuildCoordinatorError> {
+    let hybrid = &run.scenario.hybrid;
     let stiffness = HandStiffness { n_m: hybrid.hand_stiffness_n_m, nm_rad: hybrid.hand_stiffness_nm_rad };
     let parameters = HybridParameters {
         period_s: run.scenario.control_period_s,

@@ -28,31 +28,34 @@ impl GraspCompliance {
         }
     }
 
-    /// How far the object is from the mean of the sticks' tips (eq. 27), by the internal part of the hands'
-    /// filtered wrenches, which go one tick on. `shares` are the tips' weights in that mean, and in what
-    /// they bear of the external wrench (W⁻).
+    /// How far the object is from the mean of the sticks' tips (eq. 27), by the hands' filtered wrenches,
+    /// which go one tick on. `shares` are the tips' weights in that mean, and in what they bear of the
+    /// external wrench (W⁻).
     ///
-    /// The external part is left out. An object that something holds, a wall that it is pressed against or
-    /// what it rests on, would else seem not to follow its hands at all, and they would push it harder and
-    /// harder until it slips. Of the object's weight, which is always there, nobody is the wiser.
+    /// Unless the object `is_free`, only the internal part of the wrenches counts. An object that something
+    /// holds, a wall that it is pressed against or what it rests on, would else seem not to follow its hands
+    /// at all, and they would push it harder and harder until it slips.
     pub(crate) fn object_yield<'a>(
         &self,
         filtered: &mut [[f64; 6]],
         hands: impl Iterator<Item = (&'a HandInput, &'a VirtualStick)> + Clone,
         shares: &[f64],
+        is_free: bool,
     ) -> Twist<World> {
-        let mut external = Wrench::zero();
+        let mut held = Wrench::zero();
         for (filtered, (hand, stick)) in filtered.iter_mut().zip(hands.clone()) {
             for (filtered, wrench) in filtered.iter_mut().zip(hand.wrench.to_array()) {
                 *filtered = wrench + self.filter_pole * (*filtered - wrench);
             }
-            external += stick.tip_wrench(&hand.pose, &Wrench::from_array(filtered));
+            if !is_free {
+                held += stick.tip_wrench(&hand.pose, &Wrench::from_array(filtered));
+            }
         }
         let mut mean = Twist::zero();
         for ((filtered, share), (hand, stick)) in filtered.iter().zip(shares).zip(hands) {
-            let borne = stick.hand_wrench(&hand.pose, &(external * *share));
-            let internal = Wrench::from_array(filtered) - borne;
-            mean += self.tip_yield(&hand.pose, stick, &internal) * *share;
+            let on_holder = stick.hand_wrench(&hand.pose, &(held * *share));
+            let on_object = Wrench::from_array(filtered) - on_holder;
+            mean += self.tip_yield(&hand.pose, stick, &on_object) * *share;
         }
         mean
     }
@@ -80,30 +83,46 @@ mod tests {
         HandInput { pose, pose_commanded: pose, wrench: Wrench::new(force, moment) }
     }
 
-    fn found(compliance: &GraspCompliance, hands: &[HandInput; 2]) -> Twist<World> {
+    fn found(compliance: &GraspCompliance, hands: &[HandInput; 2], is_free: bool) -> Twist<World> {
         let sticks = hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &Pose::<World, Object>::identity()));
-        compliance.object_yield(&mut [[0.0; 6]; 2], hands.iter().zip(&sticks), &[0.5, 0.5])
+        compliance.object_yield(&mut [[0.0; 6]; 2], hands.iter().zip(&sticks), &[0.5, 0.5], is_free)
     }
 
     #[test]
-    fn an_object_hangs_behind_hands_that_strain_it() {
+    fn an_object_hangs_behind_hands_that_push_it() {
+        let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 1e-2, filter_pole: 0.0 };
+        let lift = Vector3::new(0.0, 0.0, 2.0);
+        let hands = [hand(0.5, lift, Vector3::zeros()), hand(-0.5, lift, Vector3::new(0.4, 0.0, 0.0))];
+        let found = found(&compliance, &hands, true);
+        // Both lift 2 mm short; one turns 4 mrad about its palm, half a metre from the middle.
+        assert!(
+            (found.linear - Vector3::new(0.0, 0.0, -0.002 - 0.5 * 0.004 * 0.5)).norm() < 1e-12,
+            "{found:?}"
+        );
+        assert!((found.angular - Vector3::new(-0.002, 0.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn an_object_hangs_behind_hands_that_strain_it_whether_it_is_free_or_not() {
         let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 1e-2, filter_pole: 0.0 };
         // One turns by 4 mrad about its palm, half a metre from the middle; the other holds against it.
         let turn = Vector3::new(0.4, 0.0, 0.0);
         let hands = [hand(0.5, Vector3::zeros(), turn), hand(-0.5, Vector3::zeros(), -turn)];
-        let found = found(&compliance, &hands);
-        assert!((found.linear - Vector3::new(0.0, 0.0, 0.5 * 0.004)).norm() < 1e-12, "{found:?}");
-        assert!(found.angular.norm() < 1e-12);
+        for is_free in [true, false] {
+            let found = found(&compliance, &hands, is_free);
+            assert!((found.linear - Vector3::new(0.0, 0.0, 0.5 * 0.004)).norm() < 1e-12, "{found:?}");
+            assert!(found.angular.norm() < 1e-12);
+        }
     }
 
     #[test]
-    fn what_the_hands_bear_together_is_no_yield() {
+    fn an_object_that_something_holds_does_not_hang_behind_what_pushes_it() {
         let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 1e-2, filter_pole: 0.0 };
         // 4 N and, about the middle between them, 0.4 Nm, as W⁻ deals them out.
         let (lift, turn) = (Vector3::new(0.0, 0.0, 2.0), Vector3::new(0.2, 0.0, 0.0));
         let lever = Vector3::new(1.0, 0.0, 0.0);
         let hands = [hand(0.5, lift, turn - lever), hand(-0.5, lift, turn + lever)];
-        let found = found(&compliance, &hands);
+        let found = found(&compliance, &hands, false);
         assert!(found.linear.norm() < 1e-12 && found.angular.norm() < 1e-12, "{found:?}");
     }
 
@@ -114,7 +133,7 @@ mod tests {
         let hands = [hand(0.5, pull, Vector3::zeros()), hand(-0.5, -pull, Vector3::zeros())];
         let sticks = hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &Pose::<World, Object>::identity()));
         let mut filtered = [[0.0; 6]; 2];
-        let found = compliance.object_yield(&mut filtered, hands.iter().zip(&sticks), &[1.0, 0.0]);
+        let found = compliance.object_yield(&mut filtered, hands.iter().zip(&sticks), &[1.0, 0.0], true);
         assert!((found.linear.y + 0.001).abs() < 1e-12, "a tenth of 10 N by 1 mm/N: {found:?}");
     }
 }

@@ -9,6 +9,7 @@
 
 mod build;
 mod grasp;
+mod job;
 mod leading;
 mod object_motion;
 mod participant;

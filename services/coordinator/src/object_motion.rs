@@ -85,6 +85,22 @@ impl ObjectMotion {
         Some(X_WA)
     }
 
+    /// One tick in which the object goes up by `step_m`, and nowhere else. Returns the reference pose at the
+    /// end of the tick; `None` if the state is no pose.
+    pub(crate) fn lift(&self, state: &mut ObjectMotionState, step_m: f64) -> Option<Pose<World, Object>> {
+        let up = Twist::new(Vector3::new(0.0, 0.0, step_m), Vector3::zeros());
+        let X_WA = Pose::<World, Object>::from_array(&state.pose)?.displaced(&up);
+        state.pose = X_WA.to_array();
+        state.twist = (up * self.period_s.recip()).to_array();
+        Some(X_WA)
+    }
+
+    /// Whether the operator asks for nothing more, and the object rests.
+    pub(crate) fn is_over(&self, state: &ObjectMotionState) -> bool {
+        let end_s: f64 = self.segments.iter().map(|segment| segment.duration_s).sum();
+        state.path_time_s >= end_s && state.twist == [0.0; 6]
+    }
+
     fn velocity_at(&self, mut time_s: f64) -> Twist<World> {
         for segment in &self.segments {
             if time_s < segment.duration_s {
@@ -145,6 +161,16 @@ mod tests {
         assert!((halfway.twist[0] - 0.05).abs() < 1e-12);
         let (early, late) = (run(0.5, 800), run(0.5, 2000));
         assert!(early.twist != [0.0; 6] && late.twist == [0.0; 6]);
+    }
+
+    #[test]
+    fn an_object_is_lifted_straight_up_and_its_way_is_still_before_it() {
+        let (motion, mut state) = (motion(), ObjectMotionState::at_rest(&Pose::identity()));
+        for _ in 0..10 {
+            motion.lift(&mut state, 1e-3).expect("a pose");
+        }
+        assert!((state.pose[2] - 0.01).abs() < 1e-12 && state.pose[..2] == [0.0; 2]);
+        assert!((state.twist[2] - 0.2).abs() < 1e-12 && state.path_time_s == 0.0);
     }
 
     #[test]

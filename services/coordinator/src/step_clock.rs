@@ -31,6 +31,11 @@ pub(crate) struct Wishes {
 }
 
 impl Wishes {
+    /// Whether every robot stands well where it stands.
+    pub(crate) fn are_content(&self) -> bool {
+        self.as_slice().iter().all(|wish| wish.ready && !wish.wants_step)
+    }
+
     /// Of all robots.
     pub(crate) fn of<'a>(robots: impl Iterator<Item = &'a RobotState>) -> Self {
         let mut all = Self { wishes: [StepWish::CONTENT; MAX_ROBOTS], robots: 0, speed_share: 1.0 };
@@ -68,6 +73,11 @@ impl Wishes {
 }
 
 impl TeamClockState {
+    /// Whether nobody steps.
+    pub(crate) fn is_standing(&self) -> bool {
+        self.clock == StepClock::Standing.to_words()
+    }
+
     /// The next tick; `None` if the state is no clock.
     pub(crate) fn advance(&self, timing: &StepTiming, wishes: &Wishes, may_walk: bool) -> Option<Self> {
         let clock = TeamClock { clock: StepClock::from_words(self.clock)?, waited: self.waited };

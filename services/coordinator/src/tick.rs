@@ -1,7 +1,8 @@
 //! One tick of the team's controller. No allocation, no clock, no I/O, no panic path.
 
-use crate::build::{BuildCoordinatorError, build_hybrid_law, virtual_sticks};
+use crate::build::{BuildCoordinatorError, build_hybrid_law, build_resting_law, virtual_sticks};
 use crate::grasp::GraspCompliance;
+use crate::job::{Job, Phase, PhaseWords, Seen};
 use crate::leading::{Leading, LeadingState};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::reference::References;
@@ -9,29 +10,42 @@ use crate::step_clock::{TeamClockState, Wishes, step_timing};
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_cooperation::{
-    GeneralizedForce, GeneralizedPosition, HandInput, HybridInputs, HybridLaw, HybridOutput, HybridReference,
-    HybridScratch, HybridState, VirtualStick,
+    Control, GeneralizedForce, GeneralizedPosition, HandInput, HandReference, HybridInputs, HybridLaw,
+    HybridOutput, HybridReference, HybridScratch, HybridState, VirtualStick,
 };
 use mikoshi_humanoid::gait::StepTiming;
-use mikoshi_ipc_types::{MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, mode};
-use mikoshi_spatial::{Hand, Pose, Twist, World, Wrench};
+use mikoshi_ipc_types::{
+    MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, all_hands, mode,
+};
+use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// How near its place on the object a hand must be, by its robot's word, to be closed.
+const REACH_M: f64 = 0.01;
+/// The same about an axis.
+const REACH_RAD: f64 = 0.05;
 
 /// The team's controller. Immutable.
 #[derive(Clone, Debug)]
 pub struct Coordinator {
     law: HybridLaw,
+    /// While the object rests on something.
+    resting_law: HybridLaw,
     references: References,
     compliance: GraspCompliance,
+    /// Whether the team presses the object against something: an axis of it is under force control.
+    presses: bool,
     /// One robot leads; absent where the team is coordinated by symmetry.
     leading: Option<Leading>,
     motion: ObjectMotion,
     timing: StepTiming,
-    /// Tick at which the object is first asked to move; it never is when absent.
+    job: Job,
+    /// When the object is first asked to move, by the job's clock of the motion; it never is when absent.
     motion_start_tick: Option<u64>,
-    /// Tick at which the hybrid law starts; it never does when absent.
-    hybrid_start_tick: Option<u64>,
     hands_of_robots: Vec<usize>,
     sticks: Vec<VirtualStick>,
+    /// Where the object is in the beginning.
+    X_WA_start: Pose<World, Object>,
 }
 
 /// All that matters between ticks.
@@ -46,10 +60,11 @@ pub struct CoordinatorState {
     leading: LeadingState,
     /// What each hand applies to the object, filtered.
     hand_wrench: [[f64; 6]; MAX_HANDS_OF_TEAM],
-    /// Generalized force then, row by row.
+    /// Generalized force when the law started, row by row.
     force_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
-    /// One of [`mode`].
-    team_mode: u64,
+    /// The tick in which it started, or in which another one took its place.
+    hybrid_since: u64,
+    phase: PhaseWords,
 }
 
 // SAFETY: zeros are a valid value of integers and floats.
@@ -106,17 +121,24 @@ impl Coordinator {
         let law = build_hybrid_law(run)?;
         let references = References::new(&run.scenario, law.internal_forces())?;
         let scenario = &run.scenario;
+        let object_row = law.parameters().selection.rows().first();
         Ok(Self {
+            presses: object_row.is_some_and(|row| row.contains(&Control::Force)),
             law,
+            resting_law: build_resting_law(run)?,
             references,
             compliance: GraspCompliance::new(scenario),
             leading: Leading::new(run)?,
             motion: ObjectMotion::new(run),
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
-            hybrid_start_tick: scenario.hybrid_start_tick(),
+            job: Job::new(scenario),
             hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
             sticks: virtual_sticks(run)?,
+            X_WA_start: Pose::new(
+                Vector3::from(scenario.object.position_m),
+                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), scenario.object.yaw_deg.to_radians()),
+            ),
         })
     }
 
@@ -132,7 +154,8 @@ impl Coordinator {
             leading: LeadingState::at_start(None, &Pose::identity(), &[]),
             hand_wrench: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
-            team_mode: mode::HOLD,
+            hybrid_since: 0,
+            phase: Phase::default().to_words(),
         })
     }
 
@@ -160,19 +183,26 @@ impl Coordinator {
     ) -> Result<(), CoordinateError> {
         let CoordinatorScratch { law: law_scratch, law_output, hands, force_ref, position_ref } = scratch;
         read_hands(robots.clone(), &self.hands_of_robots, hands)?;
-        let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands)?;
-        let wishes = Wishes::of(robots);
+        let wishes = Wishes::of(robots.clone());
 
-        let is_hybrid = mode::is_hybrid(state.team_mode);
-        let is_moving = is_hybrid && self.motion_start_tick.is_some_and(|start| tick >= start);
+        let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
+        let is_free = self.job.is_in_the_air(&phase) && !self.presses;
+        let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands, is_free)?;
+        let is_hybrid = mode::is_hybrid(phase.mode());
+        let motion_ticks = self.job.motion_ticks(&phase, tick);
+        let is_moving = motion_ticks.zip(self.motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
         let speed_share = if is_moving { wishes.speed_share } else { 0.0 };
         // State changes only when nothing can fail any more.
         let mut motion = state.motion;
-        let X_WA_ref = self.motion.advance(&mut motion, speed_share).ok_or(CoordinateError::State)?;
-        let may_walk = state.team_mode == mode::CARRY;
+        let X_WA_ref = match self.job.object_step_m(&phase, tick) {
+            Some(step_m) => self.motion.lift(&mut motion, step_m),
+            None => self.motion.advance(&mut motion, speed_share),
+        };
+        let X_WA_ref = X_WA_ref.ok_or(CoordinateError::State)?;
+        let may_walk = phase.mode() == mode::CARRY;
         let clock = state.clock.advance(&self.timing, &wishes, may_walk).ok_or(CoordinateError::State)?;
 
-        let ticks_since_start = tick.saturating_sub(self.hybrid_start_tick.unwrap_or(tick));
+        let ticks_since_start = tick.saturating_sub(state.hybrid_since);
         self.references.fill(ticks_since_start, &X_WA_ref, &state.force_at_start, force_ref, position_ref);
         // A leader's team has no hybrid law: hands are where leader and followers have them.
         let is_led = is_hybrid && self.leading.is_some();
@@ -182,9 +212,8 @@ impl Coordinator {
             object_twist: motion.twist(),
         });
         let inputs = HybridInputs { hands, grasp_yield, reference };
-        self.law
-            .act(&mut state.hybrid, law_scratch, &inputs, law_output)
-            .map_err(|_| CoordinateError::Law)?;
+        let law = if phase.is_resting() { &self.resting_law } else { &self.law };
+        law.act(&mut state.hybrid, law_scratch, &inputs, law_output).map_err(|_| CoordinateError::Law)?;
         if let Some(leading) = self.leading.as_ref().filter(|_| is_led) {
             let object = (&X_WA_ref, &motion.twist());
             leading
@@ -193,14 +222,57 @@ impl Coordinator {
                 .ok_or(CoordinateError::State)?;
         }
         (state.motion, state.clock, state.hand_wrench) = (motion, clock, hand_wrench);
+        move_open_hands(state, &mut law_output.hands, self.job.hand_step_m(&phase, tick));
 
-        self.write_commands(tick, state, law_output, out);
-        write_team_state(state, law_output, is_hybrid.then_some((&*force_ref, &*position_ref)), out);
+        self.write_commands(tick, state, &phase, law_output, out);
+        let reference = is_hybrid.then_some((&*force_ref, &*position_ref));
+        write_team_state(state, &phase, law_output, reference, out);
         out.team_state.speed_share = speed_share;
-        if state.team_mode == mode::HOLD && self.hybrid_start_tick.is_some_and(|start| tick + 1 >= start) {
-            self.start_hybrid(state, hands, &grasp_yield, law_output);
+
+        let seen = self.look(state, hands, robots, &wishes, law_output);
+        let next = self.job.next(phase, tick + 1, &seen);
+        if next != phase {
+            // Whatever a phase moves comes to rest in its end.
+            state.motion.twist = [0.0; 6];
+            state.phase = next.to_words();
+            if mode::is_hybrid(next.mode()) && !is_hybrid {
+                // Control starts where the object is, not where it should be: nothing jumps.
+                let X_WA = &law_output.position.external;
+                state.motion = ObjectMotionState::at_rest(X_WA);
+                state.leading = LeadingState::at_start(self.leading.as_ref(), X_WA, hands);
+                start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
+            } else if is_hybrid && next.is_resting() != phase.is_resting() {
+                start_law(state, tick + 1, hands, &grasp_yield, &X_WA_ref, law_output);
+            }
         }
         Ok(())
+    }
+
+    /// What decides how the job goes on.
+    fn look<'a>(
+        &self,
+        state: &CoordinatorState,
+        hands: &[HandInput],
+        robots: impl Iterator<Item = &'a RobotState> + Clone,
+        wishes: &Wishes,
+        law: &HybridOutput,
+    ) -> Seen {
+        let is_in_reach = |(hand, stick): (&HandInput, &VirtualStick)| {
+            // At the grasp the stick's tip coincides with the object's frame.
+            let place = self.X_WA_start * stick.X_HB.inverse().relabel::<Object, Hand>();
+            let gap = place.displacement_to(&hand.pose);
+            gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
+        };
+        let holding = || robots.clone().zip(&self.hands_of_robots);
+        Seen {
+            in_reach: hands.iter().zip(&self.sticks).all(is_in_reach),
+            all_hold: holding().all(|(robot, &hands)| robot.holding_hands == all_hands(hands)),
+            none_holds: holding().all(|(robot, _)| robot.holding_hands == 0),
+            motion_is_over: self.motion.is_over(&state.motion),
+            team_stands: state.clock.is_standing() && wishes.are_content(),
+            carried_n: law.force.external.force.z,
+            applied_n: law.force.external.force.norm(),
+        }
     }
 
     /// How far the object is from where rigid grasps would have it, and the filtered wrenches that say so.
@@ -208,6 +280,7 @@ impl Coordinator {
         &self,
         state: &CoordinatorState,
         hands: &[HandInput],
+        is_free: bool,
     ) -> Result<([[f64; 6]; MAX_HANDS_OF_TEAM], Twist<World>), CoordinateError> {
         let mut sticks = [VirtualStick { X_HB: Pose::identity() }; MAX_HANDS_OF_TEAM];
         for (stick, array) in sticks.iter_mut().zip(&state.hybrid.sticks).take(hands.len()) {
@@ -215,36 +288,16 @@ impl Coordinator {
         }
         let mut hand_wrench = state.hand_wrench;
         let shares = self.law.internal_forces().w_inverse();
-        let found = self.compliance.object_yield(&mut hand_wrench, hands.iter().zip(&sticks), shares);
+        let hands = hands.iter().zip(&sticks);
+        let found = self.compliance.object_yield(&mut hand_wrench, hands, shares, is_free);
         Ok((hand_wrench, found))
-    }
-
-    /// Creates the virtual sticks anew from the hands as they are now (section 4.3, step 2): whatever the
-    /// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the
-    /// object from here on. Control starts where the object is, not where it should be: nothing jumps.
-    fn start_hybrid(
-        &self,
-        state: &mut CoordinatorState,
-        hands: &[HandInput],
-        grasp_yield: &Twist<World>,
-        law: &HybridOutput,
-    ) {
-        let X_WA = &law.position.external;
-        // Where they coincide if nothing yields: what yields is added to their mean in every tick.
-        let X_WB = X_WA.displaced(&-*grasp_yield);
-        for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
-            *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
-        }
-        state.motion = ObjectMotionState::at_rest(X_WA);
-        state.leading = LeadingState::at_start(self.leading.as_ref(), X_WA, hands);
-        write_force(&law.force, &mut state.force_at_start);
-        state.team_mode = mode::CARRY;
     }
 
     fn write_commands(
         &self,
         tick: u64,
         state: &CoordinatorState,
+        phase: &Phase,
         law: &HybridOutput,
         out: &mut CoordinatorOutputs,
     ) {
@@ -253,10 +306,10 @@ impl Coordinator {
         for (command, (&hands, own_clock)) in out.commands.iter_mut().zip(robots) {
             let clock = if self.leading.is_some() { own_clock } else { &state.clock };
             *command = TeamCommand {
-                team_mode: state.team_mode,
+                team_mode: phase.mode(),
                 state_tick: tick,
                 step_clock: clock.clock,
-                closed_hands: (1 << hands.min(MAX_HANDS)) - 1,
+                closed_hands: if self.job.closes_hands(phase) { all_hands(hands) } else { 0 },
                 ..TeamCommand::zeroed()
             };
             for (hand, reference) in references.by_ref().take(hands.min(MAX_HANDS)).enumerate() {
@@ -309,8 +362,41 @@ fn read_hands<'a>(
     Ok(())
 }
 
+/// A law starts at `tick`, with the object's frame at `X_WA`: references of forces begin with what is there,
+/// and the virtual sticks are created anew from the hands as they are now (section 4.3, step 2). Whatever the
+/// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the object.
+fn start_law(
+    state: &mut CoordinatorState,
+    tick: u64,
+    hands: &[HandInput],
+    grasp_yield: &Twist<World>,
+    X_WA: &Pose<World, Object>,
+    law: &HybridOutput,
+) {
+    // Where they coincide if nothing yields: what yields is added to their mean in every tick.
+    let X_WB = X_WA.displaced(&-*grasp_yield);
+    for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
+        *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
+    }
+    state.hybrid_since = tick;
+    write_force(&law.force, &mut state.force_at_start);
+}
+
+/// Moves every hand's reference along its palm; it stays there.
+fn move_open_hands(state: &mut CoordinatorState, references: &mut [HandReference], step_m: f64) {
+    if step_m == 0.0 {
+        return;
+    }
+    let back = Pose::<Hand, Hand>::new(Vector3::new(0.0, 0.0, step_m), UnitQuaternion::identity());
+    for (reference, array) in references.iter_mut().zip(&mut state.hybrid.hand_pose_ref) {
+        reference.pose = reference.pose * back;
+        *array = reference.pose.to_array();
+    }
+}
+
 fn write_team_state(
     state: &CoordinatorState,
+    phase: &Phase,
     law: &HybridOutput,
     reference: Option<(&GeneralizedForce, &GeneralizedPosition)>,
     out: &mut CoordinatorOutputs,
@@ -323,7 +409,7 @@ fn write_team_state(
         object_pose_ref: object_pose_ref.to_array(),
         object_twist_ref: state.motion.twist,
         step_clock: state.clock.clock,
-        team_mode: state.team_mode,
+        team_mode: phase.mode(),
         ..TeamState::zeroed()
     };
     write_force(&law.force, &mut team_state.generalized_force);

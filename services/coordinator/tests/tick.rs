@@ -6,7 +6,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bytemuck::Zeroable;
 use mikoshi_config::{RunSpec, load_scenario};
 use mikoshi_coordinator::{Coordinator, CoordinatorOutputs};
-use mikoshi_ipc_types::{RobotState, mode};
+use mikoshi_ipc_types::{RobotState, TeamCommand, all_hands, flag, mode};
 use mikoshi_spatial::{Hand, Object, Pose, World};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
@@ -15,7 +15,14 @@ use std::path::Path;
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 fn hold(overrides: &[(&str, &str)]) -> RunSpec {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/hold.toml");
+    resolved("hold", overrides)
+}
+
+fn resolved(scenario: &str, overrides: &[(&str, &str)]) -> RunSpec {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../config/scenarios")
+        .join(scenario)
+        .with_extension("toml");
     let overrides: Vec<_> =
         overrides.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
     mikoshi_resolution::resolve(&load_scenario(&path, &overrides, None).expect("it loads"))
@@ -119,4 +126,109 @@ fn a_hand_that_is_no_pose_is_refused_and_changes_nothing() {
     assert!(coordinator.tick(0, &mut state, &mut scratch, robots.iter(), &mut out).is_err());
     assert_eq!(state, before);
     assert_eq!(out, CoordinatorOutputs::default());
+}
+
+/// Robots that do what they are told: hands are where they shall be and hold if they shall. The object weighs
+/// on hands that have lifted it.
+fn obedient(run: &RunSpec, commands: &[TeamCommand], lifted_m: f64) -> Vec<RobotState> {
+    let robots = run.robots.iter().zip(commands);
+    robots
+        .map(|(robot, command)| {
+            let mut state = RobotState::zeroed();
+            let hands = robot.grasping_hands.len();
+            state.holding_hands = command.closed_hands & all_hands(hands);
+            (state.flags, state.speed_share) = (flag::READY_TO_STEP | flag::CAN_STOP, 1.0);
+            (state.hand_pose, state.hand_pose_commanded) = (command.hand_pose_ref, command.hand_pose_ref);
+            for wrench in state.hand_wrench.iter_mut().take(hands) {
+                let holds = state.holding_hands == all_hands(hands) && lifted_m > 0.0;
+                wrench[2] = if holds { 3.0 * 9.81 / 8.0 } else { 0.0 };
+            }
+            state
+        })
+        .collect()
+}
+
+/// Where hands begin in this run: drawn back from where they will hold.
+fn drawn_back(run: &RunSpec, draw_back_m: f64) -> Vec<TeamCommand> {
+    let X_WA = Pose::<World, Object>::new(run.scenario.object.position_m.into(), UnitQuaternion::identity());
+    let back = Pose::<Hand, Hand>::new(Vector3::new(0.0, 0.0, draw_back_m), UnitQuaternion::identity());
+    let command = |robot: &mikoshi_config::RobotSpec| {
+        let mut command = TeamCommand::zeroed();
+        for (pose, X_AH) in command.hand_pose_ref.iter_mut().zip(&robot.hand_in_object) {
+            *pose = (X_WA * Pose::<Object, Hand>::from_array(X_AH).expect("a pose") * back).to_array();
+        }
+        command
+    };
+    run.robots.iter().map(command).collect()
+}
+
+#[test]
+fn a_job_goes_through_all_its_modes_without_an_allocation_and_without_a_jump() {
+    let short = [
+        ("motion.segments", "[{duration_s = 1.0, velocity_m_s = [0.0, 0.05, 0.0]}]"),
+        ("job.settle_s", "0.5"),
+        ("job.unload_s", "0.5"),
+    ];
+    let run = resolved("pick_and_place", &short);
+    let coordinator = Coordinator::new(&run).expect("a coordinator");
+    let (mut state, mut scratch) = (coordinator.initial_state().expect("a state"), coordinator.scratch());
+    let (mut other_state, mut poisoned) = (state, coordinator.scratch());
+    let (mut out, mut other_out) = (CoordinatorOutputs::default(), CoordinatorOutputs::default());
+    let start = drawn_back(&run, 0.05);
+    let (mut commands, mut modes, mut lifted_m) = (start.clone(), vec![], 0.0);
+    for tick in 0..4000 {
+        let robots = obedient(&run, &commands, lifted_m);
+        assert_no_alloc(|| coordinator.tick(tick, &mut state, &mut scratch, robots.iter(), &mut out))
+            .expect("commands");
+        poisoned.poison();
+        coordinator
+            .tick(tick, &mut other_state, &mut poisoned, robots.iter(), &mut other_out)
+            .expect("commands");
+        assert_eq!(bytemuck::bytes_of(&out.commands), bytemuck::bytes_of(&other_out.commands), "tick {tick}");
+
+        for (now, before) in out.commands.iter().zip(&commands) {
+            let moved = now.hand_pose_ref.as_flattened().iter().zip(before.hand_pose_ref.as_flattened());
+            let largest = moved.map(|(now, before)| (now - before).abs()).fold(0.0, f64::max);
+            assert!(largest < 5e-4, "tick {tick}: {largest}");
+        }
+        if modes.last() != Some(&out.team_state.team_mode) {
+            modes.push(out.team_state.team_mode);
+        }
+        commands = out.commands[..run.robots.len()].to_vec();
+        lifted_m = commands[0].hand_pose_ref[0][2] - 0.96;
+    }
+    use mode::{APPROACH, CARRY, GRASP, HOLD, LIFT, LOWER, RELEASE};
+    assert_eq!(modes, [HOLD, APPROACH, GRASP, LIFT, CARRY, LOWER, RELEASE, HOLD]);
+    // Hands end where they began, as far aside as the object was carried.
+    for (end, start) in commands.iter().zip(&start) {
+        for (end, start) in end.hand_pose_ref.iter().zip(&start.hand_pose_ref).take(2) {
+            let way = [end[0] - start[0], end[1] - start[1] - 0.05, end[2] - start[2]];
+            assert!(way.iter().all(|way| way.abs() < 5e-3), "{way:?}");
+        }
+        assert_eq!(end.closed_hands, 0);
+    }
+}
+
+#[test]
+fn a_hand_that_lets_go_on_the_way_stops_the_team_where_it_is() {
+    let run = resolved("pick_and_place", &[("job.settle_s", "0.5")]);
+    let coordinator = Coordinator::new(&run).expect("a coordinator");
+    let (mut state, mut scratch) = (coordinator.initial_state().expect("a state"), coordinator.scratch());
+    let (mut out, mut commands) = (CoordinatorOutputs::default(), drawn_back(&run, 0.05));
+    for tick in 0..1200 {
+        let mut robots = obedient(&run, &commands, 0.01);
+        if tick >= 1000 {
+            robots[2].holding_hands = 0b01;
+        }
+        coordinator.tick(tick, &mut state, &mut scratch, robots.iter(), &mut out).expect("commands");
+        let expected = if tick <= 1000 { mode::LIFT } else { mode::SAFE_STOP };
+        assert!(tick < 990 || out.team_state.team_mode == expected, "tick {tick}");
+        if tick > 1001 {
+            for (now, before) in out.commands.iter().zip(&commands) {
+                assert_eq!(now.hand_pose_ref, before.hand_pose_ref);
+                assert_eq!(now.closed_hands, 0b11, "the others go on to hold");
+            }
+        }
+        commands = out.commands[..run.robots.len()].to_vec();
+    }
 }

@@ -170,8 +170,8 @@ impl Legs {
         self.gait.speed_share(&state.gait, state.hand_centre.as_ref())
     }
 
-    /// One tick: the feet follow the team's clock and the hands' references, the centre of mass the feet,
-    /// and the soles what is felt.
+    /// One tick: the feet follow the team's clock and the references of the hands that carry, the centre of
+    /// mass the feet, and the soles what is felt.
     pub(crate) fn act(
         &self,
         state: &mut LegsState,
@@ -217,7 +217,8 @@ impl Legs {
         }
     }
 
-    /// Where the feet belong under the hands is recorded when the hands first have references.
+    /// Where the feet belong under the hands is recorded when the hands begin to carry, and forgotten when
+    /// they don't any more.
     fn place_feet(&self, state: &mut LegsState, hands: &[HandReference]) {
         let mut poses = [Pose::identity(); MAX_HANDS];
         let mut motions = [(Pose::identity(), Twist::zero()); MAX_HANDS];
@@ -225,7 +226,9 @@ impl Legs {
             *pose = hand.pose;
             *motion = (hand.pose, hand.twist);
         }
-        if state.gait.placement.is_none() {
+        if hands.is_empty() {
+            state.gait.placement = None;
+        } else if state.gait.placement.is_none() {
             let feet = PerFoot::from_fn(|side| state.gait.feet[side].pose);
             let grasping = poses.get(..hands.len()).unwrap_or(&poses);
             state.gait.placement = FootPlacement::record(grasping, &feet);

@@ -11,7 +11,7 @@ use mikoshi_humanoid::estimate::{
 use mikoshi_humanoid::gait::{StepClock, StepWish};
 use mikoshi_humanoid::{IkReport, IkScratch, IkState, IkTargets, Kinematics};
 use mikoshi_ipc_types::{
-    JointCommand, MAX_HANDS, MAX_JOINTS, PoseWire, RobotState, Sensors, TeamCommand, flag, mode,
+    JointCommand, MAX_HANDS, MAX_JOINTS, PoseWire, RobotState, Sensors, TeamCommand, all_hands, flag, mode,
 };
 use mikoshi_spatial::{Hand, Pose, Sensor, Twist, World, Wrench};
 use nalgebra::{Vector2, Vector3};
@@ -40,6 +40,8 @@ pub struct ServoState {
     hand_error_max_m: f64,
     joint_margin_rad: f64,
     flags: u64,
+    /// Of the last command: bit h for grasping hand h.
+    closed_hands: u64,
 }
 
 /// Workspaces: filled with NaN between ticks they change nothing.
@@ -101,6 +103,7 @@ impl Servo {
             hand_error_max_m: 0.0,
             joint_margin_rad: mikoshi_humanoid::ik::joint_margin(&robot.model, &spec.initial_posture_rad),
             flags: 0,
+            closed_hands: if run.scenario.begins_closed() { all_hands(robot.palms.len()) } else { 0 },
         };
         Ok(Self { robot, legs, initial })
     }
@@ -239,7 +242,8 @@ impl Servo {
         }
         out.joint_position_ref_rad = state.ik.joint_position;
         out.joint_velocity_ref_rad_s = state.ik.joint_velocity;
-        out.closed_hands = command.map_or(0, |command| command.closed_hands);
+        state.closed_hands = command.map_or(state.closed_hands, |command| command.closed_hands);
+        out.closed_hands = state.closed_hands;
         out.team_command_tick = command.map_or(0, |command| command.state_tick);
         Ok(())
     }
@@ -262,7 +266,9 @@ impl Servo {
             let (twist, wrench) = (Twist::from_array(twist), Wrench::from_array(wrench));
             *reference = HandReference { pose, twist, wrench };
         }
-        let grasping = references.get(..count).unwrap_or(&references);
+        // Open hands carry nothing, and the feet need not follow them.
+        let grasping = if mode::is_hybrid(command.team_mode) { references.get(..count) } else { None };
+        let grasping = grasping.unwrap_or_default();
         let legs = self.legs.act(legs, clock, grasping, felt);
         Ok(IkTargets {
             stance: legs.stance,

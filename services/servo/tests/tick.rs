@@ -115,3 +115,54 @@ fn hands_that_fall_behind_their_references_are_reported() {
     assert_ne!(said.flags & flag::HANDS_BEHIND, 0);
     assert!(said.hand_error_max_m > 0.3);
 }
+
+/// What the servo says after it has followed hands that go aside in `mode`, 0.1 m in a second.
+fn after_going_aside(
+    servo: &Servo,
+    run: &RunSpec,
+    state: &mut mikoshi_servo::ServoState,
+    team_mode: u64,
+) -> (RobotState, JointCommand) {
+    let mut scratch = servo.scratch();
+    let (mut said, mut command) = (RobotState::zeroed(), JointCommand::zeroed());
+    servo.act(state, &mut scratch, None, &mut command).expect("it holds");
+    let mut aside = TeamCommand::zeroed();
+    for tick in 0..200 {
+        servo.sense(state, &mut scratch, &sensors(run, &command, tick), &mut said);
+        if tick == 0 {
+            aside = TeamCommand { team_mode, closed_hands: 0b10, ..follow(&said) };
+        }
+        aside.hand_pose_ref.iter_mut().take(2).for_each(|pose| pose[1] += 5e-4);
+        servo.act(state, &mut scratch, Some(&aside), &mut command).expect("a command");
+    }
+    servo.sense(state, &mut scratch, &sensors(run, &command, 200), &mut said);
+    (said, command)
+}
+
+#[test]
+fn feet_follow_hands_that_carry_and_no_others() {
+    let run = hold();
+    let servo = Servo::new(&run, 0).expect("a servo");
+    let wants_step = |state: &mut _, team_mode| {
+        after_going_aside(&servo, &run, state, team_mode).0.flags & flag::WANTS_STEP != 0
+    };
+    let mut state = servo.initial_state();
+    assert!(!wants_step(&mut state, mode::APPROACH) && !wants_step(&mut state, mode::RELEASE));
+    let mut state = servo.initial_state();
+    assert!(wants_step(&mut state, mode::CARRY));
+    // Hands that have let go forget where the feet belonged.
+    assert!(!wants_step(&mut state, mode::RELEASE));
+}
+
+#[test]
+fn hands_stay_closed_or_open_until_somebody_says_otherwise() {
+    let run = hold();
+    let servo = Servo::new(&run, 0).expect("a servo");
+    let mut state = servo.initial_state();
+    let (mut scratch, mut command) = (servo.scratch(), JointCommand::zeroed());
+    servo.act(&mut state, &mut scratch, None, &mut command).expect("it holds");
+    assert_eq!(command.closed_hands, 0b11, "hands hold from the beginning");
+    assert_eq!(after_going_aside(&servo, &run, &mut state, mode::APPROACH).1.closed_hands, 0b10);
+    servo.act(&mut state, &mut scratch, None, &mut command).expect("it holds");
+    assert_eq!(command.closed_hands, 0b10);
+}

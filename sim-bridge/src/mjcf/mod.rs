@@ -103,9 +103,10 @@ fn write_world(
         for grasp in grasps {
             writeln!(
                 xml,
-                r#"    <weld name="{0}" site1="{0}" site2="{1}" solref="0.02 1"/>"#,
+                r#"    <weld name="{0}" site1="{0}" site2="{1}" solref="0.02 1" active="{2}"/>"#,
                 escape(&grasp.palm),
                 escape(&grasp.site),
+                scenario.begins_closed(),
             )?;
         }
         writeln!(xml, "  </equality>")?;

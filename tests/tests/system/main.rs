@@ -5,6 +5,7 @@ mod command;
 mod determinism;
 mod environment;
 mod faults;
+mod job;
 mod leader_follower;
 mod report;
 mod sweep;

@@ -82,7 +82,8 @@ fn observed(spec: &RunSpec) -> ObservedRun {
     ObservedRun {
         control_period_s: PERIOD_S,
         ticks: spec.ticks,
-        hybrid_start_tick: spec.scenario.hybrid_start_tick(),
+        is_controlled: spec.scenario.is_controlled(),
+        X_WBody_goal: None,
         robots: spec.robots.iter().map(robot).collect(),
         internal_rows: vec![
             row("A|B", [0.5, 0.5, -0.5, -0.5]),

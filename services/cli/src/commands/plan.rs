@@ -9,7 +9,8 @@ use crate::print::{print_error, print_out};
 use crate::pull::{Pull, pulls};
 use crate::table;
 use core::fmt::Write as _;
-use mikoshi_config::scenario::{Scenario, Thresholds};
+use mikoshi_config::RunSpec;
+use mikoshi_config::scenario::{Job, Motion, Scenario, Thresholds};
 use mikoshi_cooperation::Control;
 use mikoshi_ipc_types::{MAX_HANDS, MAX_JOINTS, MAX_ROBOTS};
 use mikoshi_runtime::{Input, required_bytes};
@@ -45,6 +46,7 @@ struct Plan<'a> {
     control_period_s: f64,
     sim_time_s: f64,
     hybrid_start_s: Option<f64>,
+    job: Option<&'a Job>,
     arms: Vec<Arm<'a>>,
     rows: Vec<Row<'a>>,
     matrices: Matrices,
@@ -105,6 +107,7 @@ impl<'a> Plan<'a> {
             control_period_s: scenario.control_period_s,
             sim_time_s: run.ticks as f64 * scenario.control_period_s,
             hybrid_start_s: scenario.hybrid.start_s,
+            job: scenario.job.as_ref(),
             arms: arms(prepared),
             rows: rows(prepared),
             matrices: Matrices {
@@ -128,7 +131,11 @@ impl<'a> Plan<'a> {
             let _ = writeln!(text, "\n{title}");
         };
         let _ = writeln!(text, "{}: {}", self.scenario, self.description);
-        let start = self.hybrid_start_s.map_or("never".to_owned(), |start_s| format!("at {start_s} s"));
+        let start = match (self.hybrid_start_s, self.job) {
+            (Some(start_s), _) => format!("at {start_s} s"),
+            (None, Some(_)) => "when the hands hold".to_owned(),
+            (None, None) => "never".to_owned(),
+        };
         let _ = writeln!(
             text,
             "{} ticks of {} ms, {} s; seed {}; hybrid control starts {start}",
@@ -138,6 +145,10 @@ impl<'a> Plan<'a> {
             self.seed
         );
 
+        if let Some(job) = self.job {
+            title(&mut text, "Job");
+            text += &job_text(job, &prepared.run);
+        }
         title(&mut text, "Arms, in hand order; palms in the object");
         text += &arms_table(&self.arms);
 
@@ -190,6 +201,28 @@ impl<'a> Plan<'a> {
             gains.stiffness_nm_rad
         )
     }
+}
+
+/// What the team does, one thing after the other, and when at the earliest.
+fn job_text(job: &Job, run: &RunSpec) -> String {
+    let carry_s = run.scenario.motion.as_ref().map_or(0.0, Motion::end_s);
+    let (lift_mm, back_mm) = (1e3 * job.lift_m, 1e3 * job.draw_back_m);
+    let creep_s = job.creep_m / job.creep_m_s;
+    let mut start_s = job.start_s;
+    let mut steps = String::new();
+    for (name, takes_s, what) in [
+        ("approach", job.approach_s, format!("open hands go {back_mm:.0} mm along their palms")),
+        ("grasp", job.grasp_s, "hands close".to_owned()),
+        ("lift", job.settle_s + job.lift_s, format!("what strains the object goes; then {lift_mm:.0} mm up")),
+        ("carry", carry_s, "by the motion".to_owned()),
+        ("lower", job.lift_s + creep_s + job.unload_s, "down until the support bears it".to_owned()),
+        ("release", job.approach_s, "hands open and draw back".to_owned()),
+    ] {
+        // Writing to a string can't fail.
+        let _ = writeln!(steps, "{name:<9} from {start_s:5.1} s on, {takes_s:4.1} s: {what}");
+        start_s += takes_s;
+    }
+    steps
 }
 
 fn arms(prepared: &Prepared) -> Vec<Arm<'_>> {

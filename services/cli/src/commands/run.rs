@@ -24,7 +24,7 @@ pub fn run(
 ) -> Result<Status, Failure> {
     let prepared = prepare(&arguments.scenario)?;
     let scenario = &prepared.run.scenario;
-    if let Some(warning) = scenario.hybrid.start_s.and_then(|_| GainReport::of(&prepared).warning()) {
+    if let Some(warning) = scenario.is_controlled().then(|| GainReport::of(&prepared).warning()).flatten() {
         print_error(&as_lines("warning", &warning));
     }
     let out = match &arguments.out {
