@@ -67,6 +67,9 @@ pub struct Scenario {
     /// Where processes run.
     #[serde(default)]
     pub placement: Placement,
+    /// What happens to processes that die.
+    #[serde(default)]
+    pub supervision: Supervision,
 }
 
 impl Scenario {
@@ -335,4 +338,19 @@ pub struct Placement {
     pub servo_cores: Vec<usize>,
     /// FIFO priority of all services; absent for the ordinary scheduler.
     pub fifo_priority: Option<u8>,
+}
+
+/// What happens to processes that die.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Supervision {
+    /// How often a service may die, or freeze, in one phase of one tick before the run ends. Each time but
+    /// the last it gets a successor that goes on where it was. 0: the first death ends the run.
+    pub restart_limit: u32,
+}
+
+impl Default for Supervision {
+    fn default() -> Self {
+        Self { restart_limit: 3 }
+    }
 }

@@ -8,14 +8,14 @@ use mikoshi_sim_bridge::{BridgeParticipant, world_xml};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let ServiceArguments { run: directory } = ServiceArguments::parse();
+    let ServiceArguments { place } = ServiceArguments::parse();
     serve(
-        &directory,
+        &place,
         |_| Ok(ServiceId::Bridge),
         |run, transport| {
             // Before the simulator sees it: if it rejects the world, one wants to look at it.
             let xml = world_xml(run).map_err(ServeError::configuration)?;
-            write_world(&directory, &xml).map_err(ServeError::fault)?;
+            write_world(place.run(), &xml).map_err(ServeError::fault)?;
             BridgeParticipant::new(run, transport).map_err(|error| match error.is_fault() {
                 true => ServeError::fault(error),
                 false => ServeError::configuration(error),

@@ -2,9 +2,15 @@
 
 use crate::{BuildWorldError, World};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Frame, JointCommand, ObjectTruth, RobotTruth, Sensors, ServiceId};
-use mikoshi_runtime::{Call, ConnectError, Loan, Participant, Publisher, Subscriber, TickError, Transport};
+use mikoshi_ipc_types::{Frame, JointCommand, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId};
+use mikoshi_runtime::{
+    Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, Transport,
+    state_schema,
+};
 use thiserror::Error;
+
+/// Of the layout of a world's checkpoint: another one gets another number.
+const STATE_VERSION: u64 = 1;
 
 /// Why a bridge could not be made.
 #[derive(Debug, Error)]
@@ -67,10 +73,7 @@ impl<T: Transport> BridgeParticipant<T> {
         &self.world
     }
 
-    fn publish(&mut self, tick: u64) -> Result<(), TickError> {
-        if self.world.tick() != tick {
-            return Err(TickError::Service("the world is at another tick"));
-        }
+    fn publish_world(&mut self, tick: u64) -> Result<(), TickError> {
         for (robot, ports) in self.robots.iter_mut().enumerate() {
             let mut loan = ports.sensors.loan(tick)?;
             self.world.sense(robot, loan.payload_mut());
@@ -100,11 +103,51 @@ impl<T: Transport> Participant for BridgeParticipant<T> {
         ServiceId::Bridge
     }
 
-    fn execute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+    fn compute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        if self.world.tick() != tick {
+            return Err(TickError::Service("the world is at another tick"));
+        }
         match call {
-            Call::Publish => self.publish(tick),
+            Call::Publish => Ok(()),
             Call::Step => self.step(tick),
             _ => Err(TickError::UnknownCall),
         }
+    }
+
+    fn publish(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        match call {
+            Call::Publish => self.publish_world(tick),
+            Call::Step => Ok(()),
+            _ => Err(TickError::UnknownCall),
+        }
+    }
+}
+
+impl<T: Transport> Replaceable for BridgeParticipant<T> {
+    fn state_schema(&self) -> u64 {
+        let parts = [
+            Sensors::SCHEMA_HASH,
+            RobotTruth::SCHEMA_HASH,
+            ObjectTruth::SCHEMA_HASH,
+            JointCommand::SCHEMA_HASH,
+            self.world.fingerprint(),
+            self.world.checkpoint_size() as u64,
+        ];
+        state_schema("bridge", STATE_VERSION, &parts)
+    }
+
+    fn state_bytes(&self) -> usize {
+        self.world.checkpoint_size()
+    }
+
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
+        let size = self.world.checkpoint_size();
+        let room = checkpoint.get_mut(..size).ok_or(TickError::Checkpoint("no room"))?;
+        self.world.save(room).map_err(|_| TickError::Checkpoint("the world can't be saved"))?;
+        Ok(size)
+    }
+
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
+        self.world.load(checkpoint).map_err(|_| TickError::Checkpoint("it is of another world"))
     }
 }

@@ -13,6 +13,7 @@ use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, RobotTruth, Sensor
 use mikoshi_spatial::Wrench;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};
 use nalgebra::Vector3;
+use xxhash_rust::xxh3::xxh3_64;
 
 /// One simulated world: the robots of a run, their object, the floor, and the boxes that stand on it.
 ///
@@ -28,6 +29,8 @@ pub struct World {
     substeps: u64,
     /// Readings that are kept for each robot: the delay in ticks, plus one.
     depth: usize,
+    /// Of the model and of the simulator.
+    fingerprint: u64,
     state: State,
     scratch: Scratch,
 }
@@ -144,7 +147,8 @@ impl World {
             hand_wrenches: vec![[Wrench::zero(); MAX_HANDS]; robots.len()].into(),
             simulator_state: vec![0.0; state_size].into(),
         };
-        let mut world = Self { data, layout, spring, noise, substeps, depth, state, scratch };
+        let fingerprint = xxh3_64(format!("{} {xml}", mujoco_rs::mujoco_version()).as_bytes());
+        let mut world = Self { data, layout, spring, noise, substeps, depth, fingerprint, state, scratch };
         world.settle(scenario.physics.step_s)?;
         // Readings from before tick 0 are those of tick 0.
         for ring in world.state.readings.chunks_exact_mut(depth) {
@@ -157,6 +161,11 @@ impl World {
     /// Number of robots.
     pub fn robot_count(&self) -> usize {
         self.state.robots.len()
+    }
+
+    /// Names the model and the simulator: worlds that have the same can load one another's checkpoints.
+    pub fn fingerprint(&self) -> u64 {
+        self.fingerprint
     }
 
     /// The tick that the world is at.

@@ -72,9 +72,3 @@ fn stabiliser_on_two_feet(bencher: Bencher) {
     let mut state = StabiliserState::default();
     bencher.bench_local(|| stabiliser.act(black_box(&mut state), black_box(&inputs)));
 }
-
-#[divan::bench]
-fn state_to_words_and_back(bencher: Bencher) {
-    let robot = walking();
-    bencher.bench_local(|| GaitState::from_words(&black_box(&robot.state).to_words()));
-}

@@ -4,7 +4,7 @@ use crate::canonical::Observation;
 use mikoshi_ipc_types::{
     Frame, JointCommand, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, TeamCommand, TeamState,
 };
-use mikoshi_runtime::{ConnectError, Observer, Tap, TickError};
+use mikoshi_runtime::{ConnectError, InOrder, Tap, TickError};
 
 /// Observers of every topic of a team.
 pub struct TeamTap<T: Tap> {
@@ -65,12 +65,12 @@ impl<T: Tap> TeamTap<T> {
 
 /// One topic, and whether its frame of the current tick has been taken.
 struct Port<T: Tap, P: Payload> {
-    observer: T::Observer<P>,
+    observer: InOrder<T::Observer<P>, P>,
     is_taken: bool,
 }
 
 fn ports<T: Tap, P: Payload>(tap: &T, robots: usize) -> Result<Vec<Port<T, P>>, ConnectError> {
-    let port = |robot| Ok(Port { observer: tap.observer(robot)?, is_taken: false });
+    let port = |robot| Ok(Port { observer: InOrder::new(tap.observer(robot)?), is_taken: false });
     (0..robots).map(port).collect()
 }
 

@@ -12,7 +12,7 @@ mod run_file;
 mod schedule;
 mod surface;
 
-pub use run_file::{RunFileError, read_run, world_file, write_run, write_world};
+pub use run_file::{RunFileError, read_run, read_spec, world_file, write_run, write_spec, write_world};
 pub use schedule::tick_schedule;
 
 use mikoshi_config::{LoadConfigError, LoadedScenario, RunSpec};

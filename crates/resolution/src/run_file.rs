@@ -25,8 +25,15 @@ pub enum RunFileError {
 /// # Errors
 /// The file can't be written.
 pub fn write_run(directory: &Path, run: &RunSpec) -> Result<(), RunFileError> {
-    let path = directory.join(RUN_FILE);
-    fs::write(&path, run.encode()).map_err(|source| RunFileError::Io { path, source })
+    write_spec(&directory.join(RUN_FILE), run)
+}
+
+/// Writes a run to a file.
+///
+/// # Errors
+/// The file can't be written.
+pub fn write_spec(path: &Path, run: &RunSpec) -> Result<(), RunFileError> {
+    fs::write(path, run.encode()).map_err(|source| RunFileError::Io { path: path.to_owned(), source })
 }
 
 /// Writes the description of a run's world, in the simulator's language, for people.
@@ -48,7 +55,15 @@ pub fn world_file(directory: &Path) -> PathBuf {
 /// # Errors
 /// The file can't be read, or is not a run of this build.
 pub fn read_run(directory: &Path) -> Result<RunSpec, RunFileError> {
-    let path = directory.join(RUN_FILE);
+    read_spec(&directory.join(RUN_FILE))
+}
+
+/// Reads a run from a file.
+///
+/// # Errors
+/// The file can't be read, or is not a run of this build.
+pub fn read_spec(path: &Path) -> Result<RunSpec, RunFileError> {
+    let path = path.to_owned();
     let bytes = fs::read(&path).map_err(|source| RunFileError::Io { path: path.clone(), source })?;
     RunSpec::decode(&bytes).map_err(|source| RunFileError::Decode { path, source })
 }

@@ -9,8 +9,8 @@
 
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_runtime::{
-    Board, Call, Domain, IceoryxTransport, Member, Participant, Placement, Role, RunDirectory, TickError,
-    TickSchedule, WaitPolicy, required_bytes, run_service,
+    Board, Call, Domain, Entry, IceoryxTransport, Member, Participant, Placement, Replaceable, Role,
+    RunDirectory, TickError, TickSchedule, WaitPolicy, required_bytes, run_service,
 };
 use std::error::Error;
 use std::path::Path;
@@ -34,7 +34,7 @@ impl<T: mikoshi_runtime::Transport> Participant for Timed<T> {
     }
 
     #[expect(clippy::disallowed_methods, reason = "a measurement of time")]
-    fn execute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+    fn compute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
         match call {
             Call::Publish => self.begins.push(Instant::now()),
             Call::Step => {
@@ -43,7 +43,29 @@ impl<T: mikoshi_runtime::Transport> Participant for Timed<T> {
             }
             _ => {}
         }
-        self.inner.execute(call, tick)
+        self.inner.compute(call, tick)
+    }
+
+    fn publish(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        self.inner.publish(call, tick)
+    }
+}
+
+impl<T: mikoshi_runtime::Transport> Replaceable for Timed<T> {
+    fn state_schema(&self) -> u64 {
+        self.inner.state_schema()
+    }
+
+    fn state_bytes(&self) -> usize {
+        self.inner.state_bytes()
+    }
+
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
+        self.inner.save(checkpoint)
+    }
+
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
+        self.inner.load(checkpoint)
     }
 }
 
@@ -55,7 +77,7 @@ fn serve(
     work: Duration,
     yield_for: Duration,
 ) -> Result<(), Box<dyn Error>> {
-    let member = Member::join(run, Role::Service(id), WaitPolicy { yield_for })?;
+    let member = Member::join(run, Role::Service(id), WaitPolicy { yield_for }, Entry::Vacant)?;
     let transport = IceoryxTransport::open(run, member, schedule)?;
     let inner = Double::new(schedule, &transport, id)?;
     let work = if id == ServiceId::Bridge { work } else { Duration::ZERO };

@@ -68,13 +68,16 @@ impl fmt::Display for Role {
 ///
 /// ```text
 /// Absent → Starting → Wired → Ready → Running → Done
-///             └─────────┴───────┴────────┴────→ Failed
+///             │ └───────┴───────┴────────┤ └──→ Failed
+///             └──── its successor ──── Retired
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u32)]
 pub enum State {
     /// Nobody has this slot.
     Absent = 0,
+    /// The process that had it has made room for its successor.
+    Retired,
     /// It sets itself up.
     Starting,
     /// All its ports exist.
@@ -93,11 +96,12 @@ impl State {
     fn from_wire(code: u32) -> Self {
         match code {
             0 => Self::Absent,
-            1 => Self::Starting,
-            2 => Self::Wired,
-            3 => Self::Ready,
-            4 => Self::Running,
-            5 => Self::Done,
+            1 => Self::Retired,
+            2 => Self::Starting,
+            3 => Self::Wired,
+            4 => Self::Ready,
+            5 => Self::Running,
+            6 => Self::Done,
             // A board is written by our processes only; whatever else it says, it is not well.
             _ => Self::Failed,
         }
@@ -113,6 +117,7 @@ impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Absent => "absent",
+            Self::Retired => "retired",
             Self::Starting => "starting",
             Self::Wired => "wired",
             Self::Ready => "ready",
@@ -146,29 +151,41 @@ pub struct SlotStatus {
 const MESSAGE_WORDS: usize = 24;
 
 /// What one process says. The first line changes seldom, the second each tick and is written by its
-/// owner only, the bed is written when it sleeps: three cache lines that don't disturb one another.
+/// owner only, the beds are written when somebody sleeps: cache lines that don't disturb one another.
 #[repr(C, align(64))]
 pub(crate) struct Slot {
     role: AtomicU64,
-    start_time: AtomicU64,
-    pub(crate) epoch: AtomicU64,
-    pid: AtomicU32,
+    /// A [`ProcessIdentity`]: who is in charge, or was last.
+    owner: AtomicU64,
+    epoch: AtomicU64,
+    /// A [`Position`]: what was published from here on counts only if it is of this epoch.
+    since: AtomicU64,
     state: AtomicU32,
+    /// Set when a successor is ready.
+    retirement: AtomicU32,
     fault: AtomicU32,
     message_length: AtomicU32,
     progress: Progress,
     pub(crate) bed: Bed,
+    /// Where one waits who will be in charge, or was.
+    pub(crate) porch: Bed,
     message: [AtomicU64; MESSAGE_WORDS],
 }
 
 #[repr(C, align(64))]
 struct Progress {
-    /// A [`Position`]: the tick, and the phase in the lowest bits.
+    /// A [`Position`].
     position: AtomicU64,
 }
 
-/// More phases in a tick than any service has.
-const PHASE_BITS: u32 = 4;
+/// Who speaks for a service.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Charge {
+    /// Its incarnation.
+    pub epoch: u64,
+    /// The first phase that it speaks for. What its predecessors published before counts.
+    pub since: Position,
+}
 
 impl Slot {
     pub(crate) fn role(&self) -> Option<Role> {
@@ -184,30 +201,63 @@ impl Slot {
     }
 
     pub(crate) fn position(&self) -> Position {
-        let word = self.progress.position.load(Ordering::Acquire);
-        Position { tick: word >> PHASE_BITS, phase: (word & ((1 << PHASE_BITS) - 1)) as usize }
+        Position::from_word(self.progress.position.load(Ordering::Acquire))
     }
 
     pub(crate) fn set_position(&self, position: Position) {
-        let word = position.tick << PHASE_BITS | position.phase as u64;
-        self.progress.position.store(word, Ordering::Release);
+        self.progress.position.store(position.to_word(), Ordering::Release);
     }
 
     pub(crate) fn process(&self) -> Option<ProcessIdentity> {
-        let pid = self.pid.load(Ordering::Acquire);
-        (pid != 0).then(|| ProcessIdentity { pid, start_time: self.start_time.load(Ordering::Acquire) })
+        ProcessIdentity::from_word(self.owner.load(Ordering::Acquire))
     }
 
-    /// Gives the slot to a process, unless a living one has it.
-    pub(crate) fn claim(&self, process: ProcessIdentity) -> Result<(), ProcessIdentity> {
-        if let Some(owner) = self.process().filter(|owner| !self.state().has_ended() && owner.is_alive()) {
+    pub(crate) fn epoch(&self) -> u64 {
+        self.epoch.load(Ordering::Acquire)
+    }
+
+    /// Who speaks for the service. Read while a successor takes over, it may be of the epoch before with a
+    /// `since` that matters only to the next.
+    pub(crate) fn charge(&self) -> Charge {
+        let epoch = self.epoch();
+        Charge { epoch, since: Position::from_word(self.since.load(Ordering::Acquire)) }
+    }
+
+    /// The living process that has the slot, if there is one.
+    pub(crate) fn living_owner(&self) -> Option<ProcessIdentity> {
+        self.process().filter(|owner| {
+            let state = self.state();
+            state != State::Retired && !state.has_ended() && owner.is_alive()
+        })
+    }
+
+    /// Gives the slot to a process, unless a living one has it; from this phase on it speaks for the
+    /// service. Returns its epoch.
+    pub(crate) fn claim(&self, process: ProcessIdentity, since: Position) -> Result<u64, ProcessIdentity> {
+        let found = self.owner.load(Ordering::Acquire);
+        if let Some(owner) = self.living_owner() {
             return Err(owner);
         }
-        self.start_time.store(process.start_time, Ordering::Release);
-        self.pid.store(process.pid, Ordering::Release);
-        self.epoch.fetch_add(1, Ordering::AcqRel);
+        // Of two successors one is first.
+        self.owner
+            .compare_exchange(found, process.to_word(), Ordering::AcqRel, Ordering::Acquire)
+            .map_err(|word| ProcessIdentity::from_word(word).unwrap_or(process))?;
+        self.fault.store(0, Ordering::Relaxed);
+        self.retirement.store(0, Ordering::Relaxed);
+        self.since.store(since.to_word(), Ordering::Release);
+        let epoch = self.epoch.fetch_add(1, Ordering::AcqRel) + 1;
         self.set_state(State::Starting);
-        Ok(())
+        Ok(epoch)
+    }
+
+    /// Asks whoever has the slot to make room at the next tick.
+    pub(crate) fn ask_to_retire(&self) {
+        self.retirement.store(1, Ordering::Release);
+        self.bed.wake_anyway();
+    }
+
+    pub(crate) fn is_asked_to_retire(&self) -> bool {
+        self.retirement.load(Ordering::Acquire) != 0
     }
 
     pub(crate) fn set_fault(&self, error: &TickError) {
@@ -241,7 +291,7 @@ impl Slot {
             role: self.role()?,
             process,
             alive: process.is_some_and(|process| process.is_alive()),
-            epoch: self.epoch.load(Ordering::Acquire),
+            epoch: self.epoch(),
             state: self.state(),
             tick: self.position().tick,
             fault: self.fault(),
@@ -256,10 +306,14 @@ struct Header {
     /// Set when the run is to end early: by request, or since a process failed.
     alarm: AtomicU32,
     stop: AtomicU32,
+    /// Set while somebody replaces processes that die.
+    succession: AtomicU32,
+    /// Changes with every successor.
+    generation: AtomicU32,
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi2");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi3");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -362,6 +416,11 @@ impl Board {
         })
     }
 
+    /// Where this service is, or was when it ended.
+    pub fn last_position(&self, service: ServiceId) -> Option<Position> {
+        self.index_of(Role::Service(service)).map(|index| self.slots()[index].position())
+    }
+
     /// What all slots say, in order.
     pub fn statuses(&self) -> Vec<SlotStatus> {
         self.slots().iter().filter_map(Slot::status).collect()
@@ -376,6 +435,26 @@ impl Board {
     pub fn request_stop(&self) {
         self.header().stop.store(1, Ordering::Release);
         self.raise_alarm();
+    }
+
+    /// Says whether processes that die are replaced: if so, others wait for their successors.
+    pub fn set_succession(&self, is_promised: bool) {
+        self.header().succession.store(u32::from(is_promised), Ordering::Release);
+        self.wake_all();
+    }
+
+    pub(crate) fn succession_is_promised(&self) -> bool {
+        self.header().succession.load(Ordering::Acquire) != 0
+    }
+
+    /// Tells all others that a process has taken another one's place.
+    pub(crate) fn announce_successor(&self) {
+        self.header().generation.fetch_add(1, Ordering::AcqRel);
+        self.wake_all();
+    }
+
+    pub(crate) fn generation(&self) -> u32 {
+        self.header().generation.load(Ordering::Acquire)
     }
 
     pub(crate) fn stop_is_requested(&self) -> bool {
@@ -395,6 +474,7 @@ impl Board {
     pub(crate) fn wake_all(&self) {
         for slot in self.slots() {
             slot.bed.wake_anyway();
+            slot.porch.wake_anyway();
         }
     }
 
@@ -447,7 +527,7 @@ mod tests {
 
         let index = ours.index_of(Role::Service(ServiceId::Servo(1))).expect("a slot");
         let slot = &ours.slots()[index];
-        slot.claim(own()).expect("it is free");
+        slot.claim(own(), Position::default()).expect("it is free");
         slot.set_position(Position { tick: 7, phase: 1 });
         slot.set_fault(&TickError::PeerLost(ServiceId::Bridge));
         slot.set_state(State::Failed);
@@ -468,13 +548,36 @@ mod tests {
         let directory = tempfile::tempdir().expect("a directory");
         let board = Board::create(directory.path(), &services(), false).expect("a board");
         let slot = &board.slots()[2];
-        slot.claim(own()).expect("it is free");
-        assert_eq!(slot.claim(own()), Err(own()));
+        assert_eq!(slot.claim(own(), Position::default()), Ok(1));
+        assert_eq!(slot.claim(own(), Position::default()), Err(own()));
 
         // Its owner has died: a successor gets it, with the next epoch.
-        slot.start_time.store(own().start_time + 1, Ordering::Relaxed);
-        slot.claim(own()).expect("its owner is gone");
-        assert_eq!(slot.epoch.load(Ordering::Relaxed), 2);
+        let dead = ProcessIdentity { start_time: own().start_time + 1, ..own() };
+        slot.owner.store(dead.to_word(), Ordering::Relaxed);
+        let since = Position { tick: 7, phase: 1 };
+        assert_eq!(slot.claim(own(), since), Ok(2));
+        assert_eq!(slot.charge(), Charge { epoch: 2, since });
+    }
+
+    #[test]
+    fn a_slot_is_free_once_its_owner_has_retired() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let board = Board::create(directory.path(), &services(), false).expect("a board");
+        let slot = &board.slots()[2];
+        slot.claim(own(), Position::default()).expect("it is free");
+        slot.ask_to_retire();
+        assert_eq!(slot.claim(own(), Position::default()), Err(own()), "it was only asked");
+        slot.set_state(State::Retired);
+        assert_eq!(slot.claim(own(), Position::default()), Ok(2));
+        assert!(!slot.is_asked_to_retire(), "its predecessor was");
+    }
+
+    #[test]
+    fn processes_survive_the_wire() {
+        for process in [own(), ProcessIdentity { pid: (1 << 22) - 1, start_time: (1 << 42) - 1 }] {
+            assert_eq!(ProcessIdentity::from_word(process.to_word()), Some(process));
+        }
+        assert_eq!(ProcessIdentity::from_word(0), None);
     }
 
     #[test]

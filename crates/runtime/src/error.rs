@@ -91,6 +91,15 @@ pub enum TickError {
     /// The service was asked for a call that it does not have.
     #[error("a call that the service does not have")]
     UnknownCall,
+    /// A successor is ready, and takes over.
+    #[error("replaced by a successor")]
+    Retired,
+    /// A successor has taken over meanwhile.
+    #[error("a successor is in charge")]
+    Fenced,
+    /// What is to be kept for a successor can't be written, or what a predecessor kept can't be read.
+    #[error("checkpoint: {0}")]
+    Checkpoint(&'static str),
     /// The process ended without saying why: a panic, for instance.
     #[error("aborted")]
     Aborted,
@@ -116,10 +125,13 @@ pub enum FaultCode {
     Service,
     UnknownCall,
     Aborted,
+    Retired,
+    Fenced,
+    Checkpoint,
 }
 
 impl FaultCode {
-    const ALL: [(Self, &'static str); 15] = [
+    const ALL: [(Self, &'static str); 18] = [
         (Self::InputMissing, "input-missing"),
         (Self::WrongSchema, "wrong-schema"),
         (Self::WrongRobot, "wrong-robot"),
@@ -135,6 +147,9 @@ impl FaultCode {
         (Self::Service, "service"),
         (Self::UnknownCall, "unknown-call"),
         (Self::Aborted, "aborted"),
+        (Self::Retired, "retired"),
+        (Self::Fenced, "fenced"),
+        (Self::Checkpoint, "checkpoint"),
     ];
 
     /// The code with this number, if there is one.
@@ -169,6 +184,9 @@ impl TickError {
             Self::Service(_) => FaultCode::Service,
             Self::UnknownCall => FaultCode::UnknownCall,
             Self::Aborted => FaultCode::Aborted,
+            Self::Retired => FaultCode::Retired,
+            Self::Fenced => FaultCode::Fenced,
+            Self::Checkpoint(_) => FaultCode::Checkpoint,
         }
     }
 }

@@ -11,6 +11,7 @@
 //! - **topic**: one payload about one robot, published once a tick.
 
 mod board;
+mod checkpoint;
 mod domain;
 mod error;
 mod member;
@@ -20,6 +21,7 @@ mod run_directory;
 mod runner;
 mod schedule;
 mod shared_memory;
+mod snapshot;
 mod topic;
 pub mod transport;
 mod wait;
@@ -27,14 +29,17 @@ mod wait;
 pub use board::{Board, BoardError, Role, SlotStatus, State};
 pub use domain::{Domain, DomainError};
 pub use error::{FaultCode, TickError};
-pub use member::{JoinError, Member, TAP_LEAD_TICKS};
+pub use member::{Entry, JoinError, Member, TAP_LEAD_TICKS};
 pub use process::ProcessIdentity;
 pub use real_time::{MissingRight, OnMissingRight, RealTime};
 pub use run_directory::{FoundRun, RunDirectory, RunDirectoryError};
-pub use runner::{Participant, RunFault, Session, run_in_one_thread, run_service};
+pub use runner::{Participant, Replaceable, RunFault, Session, run_in_one_thread, run_service};
 pub use schedule::{Call, Input, Output, Phase, Placement, Position, ScheduleError, TickSchedule};
+pub use snapshot::{read_state, state_schema, write_state};
 pub use topic::Topic;
 pub use transport::iceoryx::{IceoryxTap, IceoryxTransport, OpenError, required_bytes};
 pub use transport::memory::{InMemoryHub, InMemoryTap, InMemoryTransport};
-pub use transport::{ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport};
+pub use transport::{
+    ConnectError, InOrder, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport,
+};
 pub use wait::WaitPolicy;

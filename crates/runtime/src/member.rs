@@ -4,7 +4,7 @@ use crate::board::{Board, BoardError, Role, Slot, State};
 use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::wait::{Reason, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use mikoshi_ipc_types::ServiceId;
 use std::io;
 use std::path::Path;
@@ -44,23 +44,54 @@ pub struct Member {
     role: Role,
     slot: usize,
     policy: WaitPolicy,
+    /// Its incarnation; 0 until it is in charge.
+    epoch: Cell<u64>,
     /// By slot; renewed when a successor takes the slot.
     watches: RefCell<Vec<Option<ProcessWatch>>>,
+    /// Of the board, when it was last looked at.
+    generation: Cell<u32>,
+    /// What is to be done when a process has taken another one's place.
+    on_successor: RefCell<Option<Box<dyn Fn()>>>,
+}
+
+/// Whose place a process comes for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// Nobody's, or that of one who has died.
+    Vacant,
+    /// Also that of one who lives: it is asked to make room.
+    Replace,
 }
 
 impl Member {
-    /// Takes this role in the run of this directory, with the next epoch.
+    /// Takes this role in the run of this directory. Whoever is the first in it is in charge at once; a
+    /// successor is when it [takes charge](Self::take_charge).
     ///
     /// # Errors
     /// There is no board, no such role, or a living process has it.
-    pub fn join(run: &Path, role: Role, policy: WaitPolicy) -> Result<Self, JoinError> {
+    pub fn join(run: &Path, role: Role, policy: WaitPolicy, entry: Entry) -> Result<Self, JoinError> {
         let board = Board::open(run)?;
-        let slot = board.index_of(role).ok_or(JoinError::NoSuchRole(role))?;
-        board.slots()[slot]
-            .claim(ProcessIdentity::own()?)
-            .map_err(|owner| JoinError::Occupied { role, owner })?;
-        let watches = RefCell::new(board.slots().iter().map(|_| None).collect());
-        Ok(Self { board, role, slot, policy, watches })
+        let index = board.index_of(role).ok_or(JoinError::NoSuchRole(role))?;
+        let slot = &board.slots()[index];
+        if let Some(owner) = slot.living_owner().filter(|_| entry == Entry::Vacant) {
+            return Err(JoinError::Occupied { role, owner });
+        }
+        // Of observers and supervisors there is no state to go on from.
+        let is_first = slot.epoch() == 0 || !matches!(role, Role::Service(_));
+        let member = Self {
+            role,
+            slot: index,
+            policy,
+            epoch: Cell::new(0),
+            watches: RefCell::new(board.slots().iter().map(|_| None).collect()),
+            generation: Cell::new(board.generation()),
+            on_successor: RefCell::default(),
+            board,
+        };
+        if is_first {
+            member.take_charge(Position::default())?;
+        }
+        Ok(member)
     }
 
     /// The board.
@@ -73,9 +104,57 @@ impl Member {
         self.role
     }
 
-    /// Its incarnation: 1 for the first process in this role.
+    /// Its incarnation: 1 for the first process in this role, 0 until it is in charge.
     pub fn epoch(&self) -> u64 {
-        self.slot().epoch.load(core::sync::atomic::Ordering::Acquire)
+        self.epoch.get()
+    }
+
+    /// Whether somebody else was in charge before.
+    pub(crate) fn is_successor(&self) -> bool {
+        self.slot().epoch() > 0 && self.epoch() != 1
+    }
+
+    /// From this phase on it speaks for its role.
+    pub(crate) fn take_charge(&self, since: Position) -> Result<(), JoinError> {
+        let claimed = self.slot().claim(ProcessIdentity::own()?, since);
+        let epoch = claimed.map_err(|owner| JoinError::Occupied { role: self.role, owner })?;
+        self.epoch.set(epoch);
+        self.board.announce_successor();
+        Ok(())
+    }
+
+    /// Asks whoever is in charge to make room, and waits until there is nobody.
+    pub(crate) fn wait_for_vacancy(&self) -> Result<(), TickError> {
+        let slot = self.slot();
+        if slot.living_owner().is_some() {
+            slot.ask_to_retire();
+        }
+        self.wait_at_porch(|| slot.living_owner().is_none())
+    }
+
+    /// Waits beside the bed that whoever is in charge sleeps in.
+    fn wait_at_porch(&self, is_over: impl Fn() -> bool) -> Result<(), TickError> {
+        let poll = || Ok(is_over().then_some(()));
+        self.slot().porch.wait(Reason::STATE, self.policy, poll, |_| match self.board.stop_is_requested() {
+            true => Err(TickError::Stopped),
+            false => Ok(()),
+        })
+    }
+
+    fn is_in_charge(&self) -> bool {
+        self.slot().epoch() == self.epoch()
+    }
+
+    /// Makes room for its successor, and stays until that is in charge: what it has published may still be
+    /// on its way.
+    pub(crate) fn retire(&self) -> Result<(), TickError> {
+        self.enter(State::Retired);
+        self.wait_at_porch(|| !self.is_in_charge())
+    }
+
+    /// What is to be done, at the latest in its next wait, when a process has taken another one's place.
+    pub(crate) fn on_successor(&self, action: impl Fn() + 'static) {
+        *self.on_successor.borrow_mut() = Some(Box::new(action));
     }
 
     /// Says that it has ended as it should.
@@ -83,8 +162,12 @@ impl Member {
         self.enter(State::Done);
     }
 
-    /// Says why it ends early, and ends the waits of all others.
+    /// Says why it ends early, and ends the waits of all others; unless another process is in charge, whose
+    /// business that is.
     pub fn fail(&self, error: &TickError) {
+        if !self.is_in_charge() {
+            return;
+        }
         self.slot().set_fault(error);
         self.enter(State::Failed);
         // What becomes of the tap is nobody's concern.
@@ -106,12 +189,20 @@ impl Member {
         self.board.wake_all();
     }
 
-    /// Enters a phase. At the start of a tick it looks whether the run goes on.
+    /// Enters a phase. At the start of a tick it looks whether the run goes on, and with whom.
     pub(crate) fn begin_phase(&self, at: Position) -> Result<(), TickError> {
-        self.slot().set_position(at);
+        if self.is_in_charge() {
+            self.slot().set_position(at);
+        }
         let Position { tick, phase } = at;
         if phase > 0 {
             return Ok(());
+        }
+        if !self.is_in_charge() {
+            return Err(TickError::Fenced);
+        }
+        if self.slot().is_asked_to_retire() {
+            return Err(TickError::Retired);
         }
         if self.board.alarm_is_raised() || tick % LOOK_AROUND_TICKS == LOOK_AROUND_TICKS - 1 {
             return self.look_around();
@@ -150,11 +241,27 @@ impl Member {
     pub(crate) fn wait_for<T>(
         &self,
         reason: Reason,
-        poll: impl FnMut() -> Result<Option<T>, TickError>,
+        mut poll: impl FnMut() -> Result<Option<T>, TickError>,
     ) -> Result<T, TickError> {
+        let poll = || {
+            self.welcome_successors();
+            poll()
+        };
         self.slot().bed.wait(reason, self.policy, poll, |woken| {
+            if !self.is_in_charge() {
+                return Err(TickError::Fenced);
+            }
             if woken == Woken::TimedOut || self.board.alarm_is_raised() { self.look_around() } else { Ok(()) }
         })
+    }
+
+    fn welcome_successors(&self) {
+        let generation = self.board.generation();
+        if self.generation.replace(generation) != generation
+            && let Some(action) = &*self.on_successor.borrow()
+        {
+            action();
+        }
     }
 
     /// Whether all services have said that they have ended.
@@ -177,11 +284,14 @@ impl Member {
             // Whether it has exited is asked before its state: one that is done says so before it exits.
             let has_exited = self.has_exited(index);
             match (slot.role(), slot.state()) {
-                (_, State::Absent | State::Done) | (None, _) => {}
+                (_, State::Absent | State::Retired | State::Done) | (None, _) => {}
                 (Some(Role::Service(service)), State::Failed) => {
                     let is_consequence = slot.fault_code() == Some(FaultCode::PeerLost);
                     failed = failed.into_iter().chain([(is_consequence, service)]).min();
                 }
+                // Its successor is on the way, unless whoever sends it is gone: the supervisor comes first.
+                (Some(Role::Service(_)), _)
+                    if has_exited && self.board.succession_is_promised() && !supervisor_is_lost => {}
                 (Some(Role::Service(service)), _) if has_exited => return Err(TickError::PeerLost(service)),
                 (Some(Role::Supervisor), state) => supervisor_is_lost = has_exited || state == State::Failed,
                 (Some(Role::Tap), state) if has_exited && state < State::Done => {
@@ -219,7 +329,8 @@ impl Member {
 
 impl Drop for Member {
     fn drop(&mut self) {
-        if !self.slot().state().has_ended() {
+        let state = self.slot().state();
+        if !state.has_ended() && state != State::Retired {
             self.fail(&TickError::Aborted);
         }
     }

@@ -22,6 +22,19 @@ impl fmt::Display for ProcessIdentity {
 }
 
 impl ProcessIdentity {
+    /// Linux gives pids of up to 22 bits.
+    const PID_BITS: u32 = 22;
+
+    /// As one word, so that it changes hands at once. Never 0.
+    pub(crate) fn to_word(self) -> u64 {
+        self.start_time << Self::PID_BITS | u64::from(self.pid)
+    }
+
+    pub(crate) fn from_word(word: u64) -> Option<Self> {
+        let pid = (word & ((1 << Self::PID_BITS) - 1)) as u32;
+        (pid != 0).then_some(Self { pid, start_time: word >> Self::PID_BITS })
+    }
+
     /// This process.
     ///
     /// # Errors

@@ -236,9 +236,9 @@ fn remove(run: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Member;
     use crate::board::Role;
     use crate::wait::WaitPolicy;
+    use crate::{Entry, Member};
     use mikoshi_ipc_types::ServiceId;
     use std::os::unix::fs::PermissionsExt;
 
@@ -283,7 +283,7 @@ mod tests {
         std::fs::create_dir(&orphaned).expect("it can be made");
         Board::create(&orphaned, &[ServiceId::Bridge], false).expect("a board");
         let role = Role::Service(ServiceId::Bridge);
-        let member = Member::join(&orphaned, role, WaitPolicy::default()).expect("a place");
+        let member = Member::join(&orphaned, role, WaitPolicy::default(), Entry::Vacant).expect("a place");
         assert_eq!(RunDirectory::clean_dead(base.path()).expect("nothing fails"), Vec::<PathBuf>::new());
         drop(member);
     }

@@ -125,6 +125,26 @@ pub struct Position {
 impl Position {
     /// Behind the last tick of any run.
     pub const END: Self = Self { tick: u64::MAX, phase: 0 };
+
+    /// More phases in a tick than any service has.
+    const PHASE_BITS: u32 = 4;
+
+    pub(crate) fn to_word(self) -> u64 {
+        self.tick << Self::PHASE_BITS | self.phase as u64
+    }
+
+    pub(crate) fn from_word(word: u64) -> Self {
+        Self { tick: word >> Self::PHASE_BITS, phase: (word & ((1 << Self::PHASE_BITS) - 1)) as usize }
+    }
+
+    /// The next one of a service with so many phases in a tick.
+    pub fn after(self, phases: usize) -> Self {
+        if self.phase + 1 < phases {
+            Self { phase: self.phase + 1, ..self }
+        } else {
+            Self { tick: self.tick.saturating_add(1), phase: 0 }
+        }
+    }
 }
 
 /// Why a list of phases is not a schedule.
@@ -313,6 +333,18 @@ impl TickSchedule {
         };
         let has_not_ended = |service: &ServiceId| position_of(*service) != Position::END;
         self.services().into_iter().filter(has_not_ended).filter(waits_for_nobody).collect()
+    }
+
+    /// The age of the oldest frame of this phase that somebody uses.
+    pub fn oldest_use(&self, phase: &Phase) -> u64 {
+        let ages = phase.outputs.iter().flat_map(|output| self.consumers_of(output.topic));
+        ages.map(|(_, input)| input.age_ticks).max().unwrap_or(0)
+    }
+
+    /// Which of its publisher's phases publishes this topic.
+    pub fn phase_of(&self, topic: Topic) -> Option<usize> {
+        let publishes = |phase: &Phase| phase.outputs.iter().any(|output| output.topic == topic);
+        self.phases_of(self.producer_of(topic)?).position(publishes)
     }
 
     /// The input of a service by this topic.

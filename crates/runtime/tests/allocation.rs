@@ -6,8 +6,8 @@ use core::alloc::{GlobalAlloc, Layout};
 use core::cell::Cell;
 use mikoshi_ipc_types::{Frame, ObjectTruth, ServiceId};
 use mikoshi_runtime::{
-    Board, Call, IceoryxTap, IceoryxTransport, InMemoryHub, Member, Observer, Participant, Placement,
-    Position, Role, RunDirectory, Session, Tap, TickError, TickSchedule, Transport, WaitPolicy,
+    Board, Call, Entry, IceoryxTap, IceoryxTransport, InMemoryHub, Member, Observer, Participant, Placement,
+    Position, Replaceable, Role, RunDirectory, Session, Tap, TickError, TickSchedule, Transport, WaitPolicy,
     run_in_one_thread, run_service,
 };
 use std::ops::ControlFlow;
@@ -73,10 +73,32 @@ impl<P: Participant> Participant for Frugal<P> {
         self.inner.id()
     }
 
-    fn execute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+    fn compute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        with_allocations(0, || self.inner.compute(call, tick))
+    }
+
+    fn publish(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
         let phase = self.schedule.phases_of(self.id()).find(|phase| phase.call == call);
         let frames = phase.map_or(0, |phase| phase.outputs.len());
-        with_allocations(frames * self.allocations_per_frame, || self.inner.execute(call, tick))
+        with_allocations(frames * self.allocations_per_frame, || self.inner.publish(call, tick))
+    }
+}
+
+impl<P: Replaceable> Replaceable for Frugal<P> {
+    fn state_schema(&self) -> u64 {
+        self.inner.state_schema()
+    }
+
+    fn state_bytes(&self) -> usize {
+        self.inner.state_bytes()
+    }
+
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
+        self.inner.save(checkpoint)
+    }
+
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
+        self.inner.load(checkpoint)
     }
 }
 
@@ -109,7 +131,7 @@ fn services_over_iceoryx2_allocate_no_more_than_its_loans_do() {
         .expect("a directory");
     let run = RunDirectory::create(base.path()).expect("a run");
     Board::create(run.path(), &schedule().services(), true).expect("a board");
-    let join = |role| Member::join(run.path(), role, WaitPolicy::default()).expect("a place");
+    let join = |role| Member::join(run.path(), role, WaitPolicy::default(), Entry::Vacant).expect("a place");
     std::thread::scope(|scope| {
         for id in schedule().services() {
             let join = &join;
@@ -138,12 +160,16 @@ fn services_over_iceoryx2_allocate_no_more_than_its_loans_do() {
 struct FrugalSession<'a>(&'a IceoryxTransport);
 
 impl Session for FrugalSession<'_> {
-    fn start(&self) -> Result<(), TickError> {
-        self.0.start()
+    fn start(&self, participant: &mut impl Replaceable) -> Result<Option<Position>, TickError> {
+        self.0.start(participant)
     }
 
     fn begin_phase(&self, at: Position) -> Result<(), TickError> {
         with_allocations(0, || self.0.begin_phase(at))
+    }
+
+    fn keep(&self, at: Position, participant: &mut impl Replaceable) -> Result<(), TickError> {
+        with_allocations(0, || self.0.keep(at, participant))
     }
 
     fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {

@@ -7,13 +7,14 @@ use mikoshi_ipc_types::{
     TeamState,
 };
 use mikoshi_runtime::{
-    Board, Call, Domain, FaultCode, IceoryxTap, IceoryxTransport, InMemoryHub, Member, OBSERVER_DEPTH,
-    Observer, Participant, Placement, ProcessIdentity, Role, RunDirectory, State, TAP_LEAD_TICKS, Tap,
-    TickError, TickSchedule, WaitPolicy, run_in_one_thread, run_service,
+    Board, Call, Domain, Entry, FaultCode, IceoryxTap, IceoryxTransport, InMemoryHub, InOrder, Member,
+    OBSERVER_DEPTH, Observer, Participant, Placement, ProcessIdentity, Replaceable, Role, RunDirectory,
+    State, TAP_LEAD_TICKS, Tap, TickError, TickSchedule, WaitPolicy, run_in_one_thread, run_service,
 };
 use rustix::process::{Pid, Signal, kill_process};
 use std::ops::ControlFlow;
 use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -27,29 +28,93 @@ const ENDLESS: u64 = u64::MAX;
 const STALL_AT: u64 = 50;
 
 fn schedule() -> TickSchedule {
-    TickSchedule::of_team(ROBOTS, 0, &Placement::default()).expect("a valid team")
+    schedule_with(0)
+}
+
+fn schedule_with(coordination_delay_ticks: u64) -> TickSchedule {
+    TickSchedule::of_team(ROBOTS, coordination_delay_ticks, &Placement::default()).expect("a valid team")
 }
 
 fn join(run: &Path, role: Role) -> Member {
-    Member::join(run, role, WaitPolicy::default()).expect("a place on the board")
+    Member::join(run, role, WaitPolicy::default(), Entry::Replace).expect("a place on the board")
 }
 
 // What the processes do.
 
-/// Panics in one tick.
-struct Panicking<P> {
+/// Does as the service that it holds, but ends badly in one tick.
+struct Faulty<P> {
     inner: P,
+    panic_at: u64,
+    /// In this tick, and this phase of it, it is killed at this point.
+    kill_at: (u64, u64),
+    kill_point: Point,
     tick: u64,
+    phase: u64,
 }
 
-impl<P: Participant> Participant for Panicking<P> {
+/// What a process is about when it is killed.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+enum Point {
+    /// It has not received its inputs.
+    Waiting,
+    /// It keeps what it has computed.
+    Keeping,
+    /// It has kept it, and not published it.
+    Kept,
+    /// It has published it.
+    Published,
+}
+
+impl Point {
+    const ALL: [Self; 4] = [Self::Waiting, Self::Keeping, Self::Kept, Self::Published];
+}
+
+impl<P> Faulty<P> {
+    fn pass(&self, point: Point) {
+        if (self.tick, self.phase, point) == (self.kill_at.0, self.kill_at.1, self.kill_point) {
+            let own = rustix::process::getpid();
+            kill_process(own, Signal::KILL).expect("it is ours");
+        }
+    }
+}
+
+impl<P: Participant> Participant for Faulty<P> {
     fn id(&self) -> ServiceId {
         self.inner.id()
     }
 
-    fn execute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
-        assert!(tick < self.tick, "as it was told");
-        self.inner.execute(call, tick)
+    fn compute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        assert!(tick < self.panic_at, "as it was told");
+        (self.tick, self.phase) = (tick, u64::from(matches!(call, Call::Act | Call::Step)));
+        self.pass(Point::Waiting);
+        self.inner.compute(call, tick)
+    }
+
+    fn publish(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        self.pass(Point::Kept);
+        self.inner.publish(call, tick)?;
+        self.pass(Point::Published);
+        Ok(())
+    }
+}
+
+impl<P: Replaceable> Replaceable for Faulty<P> {
+    fn state_schema(&self) -> u64 {
+        self.inner.state_schema()
+    }
+
+    fn state_bytes(&self) -> usize {
+        self.inner.state_bytes()
+    }
+
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
+        checkpoint.fill(0xff);
+        self.pass(Point::Keeping);
+        self.inner.save(checkpoint)
+    }
+
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
+        self.inner.load(checkpoint)
     }
 }
 
@@ -59,7 +124,7 @@ fn a_process_of_a_run() {
     let variable = |name: &str| std::env::var(format!("MIKOSHI_TEST_{name}")).ok();
     let Some(role) = variable("ROLE") else { return };
     let run = PathBuf::from(variable("RUN").expect("a run"));
-    let number = |name| variable(name).map_or(ENDLESS, |value| value.parse().expect("a number"));
+    let number = |name: &str| variable(name).map_or(ENDLESS, |value| value.parse().expect("a number"));
     let result = match role.as_str() {
         "supervisor" => {
             let _member = join(&run, Role::Supervisor);
@@ -83,18 +148,28 @@ fn a_process_of_a_run() {
         }
         service => {
             let id = schedule().services()[service.parse::<usize>().expect("an index")];
-            serve(&run, id, number("TICKS"), number("PANIC_AT"))
+            serve(&run, id, number)
         }
     };
     std::process::exit(result.err().map_or(0, |error| exit_code(error.code())));
 }
 
-fn serve(run: &Path, id: ServiceId, ticks: u64, panic_at: u64) -> Result<(), TickError> {
-    let schedule = schedule();
+fn serve(run: &Path, id: ServiceId, number: impl Fn(&str) -> u64) -> Result<(), TickError> {
+    let schedule = schedule_with(match number("DELAY") {
+        ENDLESS => 0,
+        delay_ticks => delay_ticks,
+    });
     let transport = IceoryxTransport::open(run, join(run, Role::Service(id)), &schedule).expect("ports");
-    let inner = Double::new(&schedule, &transport, id).expect("ports");
-    let mut participant = Panicking { inner, tick: panic_at };
-    run_service(&schedule, &mut participant, &transport, ticks).map(|_| ()).map_err(|fault| fault.error)
+    let mut participant = Faulty {
+        inner: Double::new(&schedule, &transport, id).expect("ports"),
+        panic_at: number("PANIC_AT"),
+        kill_at: (number("KILL_AT"), number("KILL_PHASE")),
+        kill_point: Point::ALL[number("KILL_POINT") as usize % Point::ALL.len()],
+        tick: 0,
+        phase: 0,
+    };
+    let run = run_service(&schedule, &mut participant, &transport, number("TICKS"));
+    run.map(|_| ()).map_err(|fault| fault.error)
 }
 
 fn sleep_for_ever() -> ! {
@@ -196,8 +271,7 @@ impl Running {
     }
 
     fn take(&mut self, role: &str) -> Children {
-        let index = self.children.0.iter().position(|(other, _)| other == role).expect("it runs");
-        Children(vec![self.children.0.remove(index)])
+        self.children.take(role)
     }
 
     fn kill(&mut self, role: &str) {
@@ -234,6 +308,11 @@ impl Running {
 struct Children(Vec<(String, Child)>);
 
 impl Children {
+    fn take(&mut self, role: &str) -> Children {
+        let index = self.0.iter().position(|(other, _)| other == role).expect("it runs");
+        Children(vec![self.0.remove(index)])
+    }
+
     fn end(&mut self) {
         for (_, child) in &mut self.0 {
             let _ = child.kill();
@@ -360,92 +439,242 @@ fn what_a_killed_supervisor_leaves_is_cleaned_at_the_next_start() {
 
 /// Every payload of a run, in the order of its schedule.
 struct Log<T: Tap> {
-    sensors: Vec<T::Observer<Sensors>>,
-    robot_truth: Vec<T::Observer<RobotTruth>>,
-    object_truth: T::Observer<ObjectTruth>,
-    robot_state: Vec<T::Observer<RobotState>>,
-    team_command: Vec<T::Observer<TeamCommand>>,
-    team_state: T::Observer<TeamState>,
-    joint_command: Vec<T::Observer<JointCommand>>,
+    sensors: Ports<T, Sensors>,
+    robot_truth: Ports<T, RobotTruth>,
+    object_truth: Ports<T, ObjectTruth>,
+    robot_state: Ports<T, RobotState>,
+    team_command: Ports<T, TeamCommand>,
+    team_state: Ports<T, TeamState>,
+    joint_command: Ports<T, JointCommand>,
     bytes: Vec<u8>,
 }
 
+type Ports<T, P> = Vec<InOrder<<T as Tap>::Observer<P>, P>>;
+
 impl<T: Tap> Log<T> {
     fn new(tap: &T) -> Self {
-        fn all<T: Tap, P: Payload>(tap: &T) -> Vec<T::Observer<P>> {
-            (0..ROBOTS).map(|robot| tap.observer(robot).expect("it is published")).collect()
+        fn all<T: Tap, P: Payload>(tap: &T, robots: usize) -> Ports<T, P> {
+            (0..robots).map(|robot| InOrder::new(tap.observer(robot).expect("it is published"))).collect()
         }
         Self {
-            sensors: all(tap),
-            robot_truth: all(tap),
-            object_truth: tap.observer(0).expect("it is published"),
-            robot_state: all(tap),
-            team_command: all(tap),
-            team_state: tap.observer(0).expect("it is published"),
-            joint_command: all(tap),
+            sensors: all(tap, ROBOTS),
+            robot_truth: all(tap, ROBOTS),
+            object_truth: all(tap, 1),
+            robot_state: all(tap, ROBOTS),
+            team_command: all(tap, ROBOTS),
+            team_state: all(tap, 1),
+            joint_command: all(tap, ROBOTS),
             bytes: Vec::new(),
         }
     }
 
     fn record(&mut self, tick: u64) {
         let bytes = &mut self.bytes;
-        self.sensors.iter_mut().for_each(|observer| append(observer, tick, bytes));
-        self.robot_truth.iter_mut().for_each(|observer| append(observer, tick, bytes));
-        append(&mut self.object_truth, tick, bytes);
-        self.robot_state.iter_mut().for_each(|observer| append(observer, tick, bytes));
-        self.team_command.iter_mut().for_each(|observer| append(observer, tick, bytes));
-        append(&mut self.team_state, tick, bytes);
-        self.joint_command.iter_mut().for_each(|observer| append(observer, tick, bytes));
+        self.sensors.iter_mut().for_each(|frames| append(frames, tick, bytes));
+        self.robot_truth.iter_mut().for_each(|frames| append(frames, tick, bytes));
+        self.object_truth.iter_mut().for_each(|frames| append(frames, tick, bytes));
+        self.robot_state.iter_mut().for_each(|frames| append(frames, tick, bytes));
+        self.team_command.iter_mut().for_each(|frames| append(frames, tick, bytes));
+        self.team_state.iter_mut().for_each(|frames| append(frames, tick, bytes));
+        self.joint_command.iter_mut().for_each(|frames| append(frames, tick, bytes));
+    }
+
+    fn is_at_its_end(&mut self) -> bool {
+        let mut frame = Frame::zeroed();
+        self.object_truth.iter_mut().all(|frames| frames.receive(&mut frame) == Ok(false))
     }
 }
 
-fn append<P: Payload>(observer: &mut impl Observer<P>, tick: u64, bytes: &mut Vec<u8>) {
+fn append<P: Payload>(frames: &mut InOrder<impl Observer<P>, P>, tick: u64, bytes: &mut Vec<u8>) {
     let mut frame = Frame::<P>::zeroed();
-    assert_eq!(observer.receive(&mut frame), Ok(true), "{} of tick {tick}", P::NAME);
+    assert_eq!(frames.receive(&mut frame), Ok(true), "{} of tick {tick}", P::NAME);
     assert_eq!(frame.envelope.tick, tick, "{}", P::NAME);
     bytes.extend_from_slice(bytemuck::bytes_of(&frame.payload));
+}
+
+/// What a run of so many ticks says if nothing happens to it.
+fn undisturbed(schedule: &TickSchedule, ticks: u64) -> Vec<u8> {
+    let hub = InMemoryHub::new(schedule.clone());
+    let mut log = Log::new(&hub.tap());
+    let mut services: Vec<_> = schedule
+        .services()
+        .into_iter()
+        .map(|id| Double::new(schedule, &hub.transport(id), id).expect("ports"))
+        .collect();
+    let run = run_in_one_thread(schedule, &mut services, ticks, |tick| {
+        log.record(tick);
+        ControlFlow::Continue(())
+    });
+    assert_eq!(run, Ok(ticks));
+    log.bytes
+}
+
+/// What a run between processes says, of which this process is the tap; `meanwhile` may see to successors.
+fn between_processes(
+    schedule: &TickSchedule,
+    ticks: u64,
+    settings_of: impl Fn(ServiceId) -> Vec<(&'static str, u64)>,
+    meanwhile: impl FnOnce(&mut Children, &Path) + Send,
+) -> Vec<u8> {
+    let mut running = Running::prepare(true);
+    let path = running.directory.path().to_path_buf();
+    running.supervisor = Some(join(&path, Role::Supervisor));
+    running.board.set_succession(true);
+    for service in schedule.services() {
+        let role = Running::index_of(service);
+        let child = spawn(&role, &path, &[settings_of(service), vec![("TICKS", ticks)]].concat());
+        running.children.0.push((role, child));
+    }
+    let tap = IceoryxTap::open(&path, join(&path, Role::Tap), schedule).expect("ports");
+    let mut log = Log::new(&tap);
+    tap.start().expect("the run starts");
+    std::thread::scope(|scope| {
+        let children = &mut running.children;
+        scope.spawn(|| meanwhile(children, &path));
+        for tick in 0..ticks {
+            log.record(tick);
+            tap.set_consumed(tick + 1);
+        }
+        assert!(log.is_at_its_end(), "the run has ended");
+    });
+    for (role, code) in running.exit_codes() {
+        assert_eq!(code, 0, "service {role}");
+    }
+    let bytes = log.bytes;
+    drop((tap, log.sensors));
+    running.assert_leaves_nothing();
+    bytes
 }
 
 #[test]
 fn six_processes_say_byte_for_byte_what_one_thread_says() {
     // Long enough for every queue to wrap around.
     let ticks = 10 * OBSERVER_DEPTH as u64;
-    let schedule = schedule();
-
-    let hub = InMemoryHub::new(schedule.clone());
-    let mut in_one_thread = Log::new(&hub.tap());
-    let mut services: Vec<_> = schedule
-        .services()
-        .into_iter()
-        .map(|id| Double::new(&schedule, &hub.transport(id), id).expect("ports"))
-        .collect();
-    let run = run_in_one_thread(&schedule, &mut services, ticks, |tick| {
-        in_one_thread.record(tick);
-        ControlFlow::Continue(())
-    });
-    assert_eq!(run, Ok(ticks));
-
+    let expected = undisturbed(&schedule(), ticks);
     for _ in 0..2 {
-        // The tap is this process.
-        let mut running = Running::prepare(true);
-        for service in schedule.services() {
+        assert!(between_processes(&schedule(), ticks, |_| vec![], |_, _| ()) == expected);
+    }
+}
+
+/// Waits for these to be killed, as they were told, in whatever order, and starts successors.
+fn replace_the_killed(
+    children: &mut Children,
+    run: &Path,
+    victims: impl Iterator<Item = ServiceId>,
+    settings_of: impl Fn(ServiceId) -> Vec<(&'static str, u64)>,
+) {
+    let mut alive: Vec<_> = victims.collect();
+    while !alive.is_empty() {
+        alive.retain(|victim| {
+            let role = Running::index_of(*victim);
+            let (_, child) = children.0.iter_mut().find(|(other, _)| *other == role).expect("it runs");
+            let Some(status) = child.try_wait().expect("it is ours") else { return true };
+            assert_eq!(status.signal(), Some(Signal::KILL.as_raw()), "{victim}: {status}");
+            *child = spawn(&role, run, &settings_of(*victim));
+            false
+        });
+        std::thread::yield_now();
+    }
+}
+
+const KILL_TICKS: u64 = 60;
+
+/// A service, a phase of it, and a point of that: where it is killed.
+type Death = (ServiceId, u64, Point);
+
+fn all_deaths() -> Vec<Death> {
+    let victims = [(ServiceId::Bridge, 2), (ServiceId::Servo(2), 2), (ServiceId::Coordinator, 1)];
+    let deaths = victims.into_iter().flat_map(|(victim, phases)| {
+        (0..phases).flat_map(move |phase| Point::ALL.map(|point| (victim, phase, point)))
+    });
+    // What only says what the state holds already is not kept.
+    deaths.filter(|death| *death != (ServiceId::Bridge, 0, Point::Keeping)).collect()
+}
+
+/// Kills these in one tick of a run, their successors too if so wished, and compares what all have said.
+fn expect_no_difference(deaths: &[Death], tick: u64, delay_ticks: u64, again: bool, expected: &[u8]) {
+    let settings_of = |service, dies: bool| {
+        let mut settings = vec![("DELAY", delay_ticks), ("TICKS", KILL_TICKS)];
+        if let Some((_, phase, point)) = deaths.iter().find(|(victim, ..)| dies && *victim == service) {
+            settings.extend([("KILL_AT", tick), ("KILL_PHASE", *phase), ("KILL_POINT", *point as u64)]);
+        }
+        settings
+    };
+    let of_first = |service| settings_of(service, true);
+    let log = between_processes(&schedule_with(delay_ticks), KILL_TICKS, of_first, |children, run| {
+        let victims = || deaths.iter().map(|(victim, ..)| *victim);
+        if again {
+            replace_the_killed(children, run, victims(), of_first);
+        }
+        replace_the_killed(children, run, victims(), |service| settings_of(service, false));
+    });
+    assert!(log == expected, "{deaths:?} in tick {tick}, delay {delay_ticks}, again: {again}");
+}
+
+#[test]
+fn wherever_a_process_is_killed_its_successor_goes_on_and_nobody_sees_a_difference() {
+    for delay_ticks in [0, 2] {
+        let expected = undisturbed(&schedule_with(delay_ticks), KILL_TICKS);
+        for death in all_deaths() {
+            // In the beginning, on the way, and at the end.
+            for tick in [0, 20, KILL_TICKS - 1] {
+                expect_no_difference(&[death], tick, delay_ticks, false, &expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn processes_may_be_killed_in_pairs() {
+    for delay_ticks in [0, 2] {
+        let expected = undisturbed(&schedule_with(delay_ticks), KILL_TICKS);
+        for one in all_deaths() {
+            for other in all_deaths().into_iter().filter(|other| other.0 > one.0 && other.2 == one.2) {
+                expect_no_difference(&[one, other], 20, delay_ticks, false, &expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_successor_may_be_killed_where_its_predecessor_was() {
+    let expected = undisturbed(&schedule(), KILL_TICKS);
+    // One that was killed after it had kept its state is not killed there again: that phase is behind it.
+    for death in all_deaths().into_iter().filter(|(_, _, point)| *point <= Point::Keeping) {
+        expect_no_difference(&[death], 20, 0, true, &expected);
+    }
+}
+
+#[test]
+fn a_process_is_replaced_while_it_works_and_nobody_sees_a_difference() {
+    let ticks = 20_000;
+    for delay_ticks in [0, 2] {
+        let settings = [("DELAY", delay_ticks), ("TICKS", ticks)];
+        let expected = undisturbed(&schedule_with(delay_ticks), ticks);
+        for service in [ServiceId::Bridge, ServiceId::Servo(2), ServiceId::Coordinator] {
             let role = Running::index_of(service);
-            let child = spawn(&role, running.directory.path(), &[("TICKS", ticks)]);
-            running.children.0.push((role, child));
+            let schedule = schedule_with(delay_ticks);
+            let log = between_processes(
+                &schedule,
+                ticks,
+                |_| settings.to_vec(),
+                |children, run| {
+                    let board = Board::open(run).expect("a board");
+                    while board.last_position(service).is_none_or(|at| at.tick < 100) {
+                        std::thread::yield_now();
+                    }
+                    let successor = spawn(&role, run, &settings);
+                    let mut retired = children.take(&role);
+                    let status = retired.0[0].1.wait().expect("it is ours");
+                    assert_eq!(status.code(), Some(exit_code(FaultCode::Retired)), "{service}");
+                    assert!(
+                        board.last_position(service).is_some_and(|at| at.tick < ticks - 1),
+                        "while it works"
+                    );
+                    children.0.push((role.clone(), successor));
+                },
+            );
+            assert!(log == expected, "{service}, delay {delay_ticks}");
         }
-        let path = running.directory.path().to_path_buf();
-        let tap = IceoryxTap::open(&path, join(&path, Role::Tap), &schedule).expect("ports");
-        let mut between_processes = Log::new(&tap);
-        tap.start().expect("the run starts");
-        for tick in 0..ticks {
-            between_processes.record(tick);
-            tap.set_consumed(tick + 1);
-        }
-        let mut frame = Frame::zeroed();
-        assert_eq!(between_processes.object_truth.receive(&mut frame), Ok(false), "the run has ended");
-        assert!(running.exit_codes().iter().all(|(_, code)| *code == 0));
-        assert!(in_one_thread.bytes == between_processes.bytes);
-        drop((tap, between_processes));
-        running.assert_leaves_nothing();
     }
 }

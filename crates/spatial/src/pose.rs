@@ -4,14 +4,17 @@ use crate::{CoordinateFrame, Twist, rotation};
 use core::marker::PhantomData;
 use core::ops::Mul;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// `X_AB`: the pose of `B` in `A`. `p_A = R_AB p_B + p_AB_A`.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Pose<A: CoordinateFrame, B: CoordinateFrame> {
     /// Rotation from axes of `B` to axes of `A`.
     pub rotation: UnitQuaternion<f64>,
     /// Origin of `B` in `A` \[m\].
     pub translation: Vector3<f64>,
+    #[serde(skip)]
     frames: PhantomData<(A, B)>,
 }
 

@@ -4,16 +4,19 @@ use crate::{CoordinateFrame, Pose};
 use core::marker::PhantomData;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub};
 use nalgebra::{Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 macro_rules! six_vector {
     ($(#[$meta:meta])* $name:ident { $(#[$first_meta:meta])* $first:ident, $(#[$second_meta:meta])* $second:ident }) => {
         $(#[$meta])*
-        #[derive(Debug)]
+        #[derive(Debug, Serialize, Deserialize)]
+        #[serde(bound = "")]
         pub struct $name<F: CoordinateFrame> {
             $(#[$first_meta])*
             pub $first: Vector3<f64>,
             $(#[$second_meta])*
             pub $second: Vector3<f64>,
+            #[serde(skip)]
             axes: PhantomData<F>,
         }
 

@@ -6,9 +6,10 @@ use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_ipc_types::ServiceId;
 use rustix::process::{Pid, Signal, getpid, getppid, set_parent_process_death_signal};
-use std::fs::{self, File};
+use std::ffi::OsStr;
+use std::fs::{self, OpenOptions};
 use std::io;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
@@ -25,6 +26,8 @@ pub struct ServiceProcess {
     pub service: ServiceId,
     /// What people call it: `bridge`, `servo of robot A`.
     pub label: String,
+    /// The robot that it controls.
+    robot: Option<String>,
     /// How it ended, once it has.
     pub ended: Option<Ended>,
     child: Child,
@@ -41,40 +44,108 @@ pub struct Ended {
 }
 
 /// The service processes of a run. Dropping them ends them.
-#[derive(Default)]
 pub struct Children {
+    run_directory: PathBuf,
+    logs: PathBuf,
     processes: Vec<ServiceProcess>,
+    /// Successors of processes that are still in charge.
+    candidates: Vec<ServiceProcess>,
 }
 
 impl Children {
-    /// Starts a service of the run in `run_directory`, which people call `label`; what it says goes to a
-    /// file in `logs`.
+    /// None yet. What they say goes to files in `logs`.
+    pub fn of(run_directory: &Path, logs: &Path) -> Self {
+        let (run_directory, logs) = (run_directory.to_owned(), logs.to_owned());
+        Self { run_directory, logs, processes: Vec::new(), candidates: Vec::new() }
+    }
+
+    /// Starts a service, which people call `label`.
     ///
     /// # Errors
     /// Its program is missing or can't be started.
-    pub fn spawn(
-        &mut self,
+    pub fn spawn(&mut self, service: ServiceId, label: String, robot: Option<&str>) -> Result<(), Failure> {
+        let robot = robot.map(str::to_owned);
+        let process = self.start(service, label, robot, &[])?;
+        self.processes.push(process);
+        Ok(())
+    }
+
+    /// Starts the successor of a process that has ended.
+    ///
+    /// # Errors
+    /// As [`Children::spawn`].
+    pub fn succeed(&mut self, service: ServiceId) -> Result<(), Failure> {
+        let Some(index) = self.processes.iter().position(|process| process.service == service) else {
+            return Ok(());
+        };
+        let ServiceProcess { label, robot, .. } = &self.processes[index];
+        self.processes[index] = self.start(service, label.clone(), robot.clone(), &[])?;
+        Ok(())
+    }
+
+    /// Starts a process that is to take the place of one that is in charge.
+    ///
+    /// # Errors
+    /// As [`Children::spawn`].
+    pub fn nominate(&mut self, service: ServiceId, spec: Option<&Path>) -> Result<(), Failure> {
+        let Some(process) = self.processes.iter().find(|process| process.service == service) else {
+            return Ok(());
+        };
+        let mut arguments = vec![OsStr::new("--replace")];
+        arguments.extend(spec.iter().flat_map(|file| [OsStr::new("--spec"), file.as_os_str()]));
+        let candidate = self.start(service, process.label.clone(), process.robot.clone(), &arguments)?;
+        self.candidates.push(candidate);
+        Ok(())
+    }
+
+    /// The successor of this service that is on its way.
+    pub fn candidate(&self, service: ServiceId) -> Option<&ServiceProcess> {
+        self.candidates.iter().find(|process| process.service == service)
+    }
+
+    /// The candidate is in charge: its predecessor, which ends by itself, is forgotten once it has.
+    pub fn promote(&mut self, service: ServiceId) {
+        let candidate = self.candidates.iter().position(|process| process.service == service);
+        let predecessor = self.processes.iter_mut().find(|process| process.service == service);
+        if let (Some(candidate), Some(predecessor)) = (candidate, predecessor) {
+            let mut retired = core::mem::replace(predecessor, self.candidates.swap_remove(candidate));
+            let since_promoted = Stopwatch::start();
+            while retired.look().is_none() && since_promoted.elapsed() < GRACE {
+                pause(LOOK);
+            }
+            retired.kill();
+        }
+    }
+
+    /// The candidate will not be in charge.
+    pub fn dismiss(&mut self, service: ServiceId) {
+        for process in self.candidates.iter_mut().filter(|process| process.service == service) {
+            process.kill();
+        }
+        self.candidates.retain(|process| process.service != service);
+    }
+
+    fn start(
+        &self,
         service: ServiceId,
         label: String,
-        robot: Option<&str>,
-        run_directory: &Path,
-        logs: &Path,
-    ) -> Result<(), Failure> {
+        robot: Option<String>,
+        arguments: &[&OsStr],
+    ) -> Result<ServiceProcess, Failure> {
         let program = binaries::find(binaries::name_of(service))?;
-        let file_name = match robot {
+        let file_name = match &robot {
             Some(robot) => format!("servo-{robot}.log"),
             None => format!("{service}.log"),
         };
-        let log = logs.join(file_name);
+        let log = self.logs.join(file_name);
         let mut command = Command::new(&program);
-        command.arg("--run").arg(run_directory);
-        if let Some(robot) = robot {
+        command.arg("--run").arg(&self.run_directory).args(arguments);
+        if let Some(robot) = &robot {
             command.args(["--robot", robot]);
         }
         let child = start(command, &log)
             .map_err(|error| Failure::fault(error).context(format_args!("{label}: {}", program.display())))?;
-        self.processes.push(ServiceProcess { service, label, ended: None, child, log });
-        Ok(())
+        Ok(ServiceProcess { service, label, robot, ended: None, child, log })
     }
 
     /// All processes.
@@ -84,16 +155,12 @@ impl Children {
 
     /// Looks which have ended; whether any of them ended otherwise than with success.
     pub fn look(&mut self) -> bool {
-        let mut has_failed = false;
-        for process in &mut self.processes {
-            if process.ended.is_none()
-                && let Ok(Some(status)) = process.child.try_wait()
-            {
-                process.ended = Some(Ended { status, by_us: false });
-            }
-            has_failed |= process.ended.is_some_and(|ended| !ended.status.success());
+        for candidate in &mut self.candidates {
+            candidate.look();
         }
-        has_failed
+        self.processes.iter_mut().fold(false, |has_failed, process| {
+            has_failed | process.look().is_some_and(|ended| !ended.status.success())
+        })
     }
 
     /// Kills these: they are frozen, and would not end by themselves.
@@ -108,7 +175,8 @@ impl Children {
         let since_asked = Stopwatch::start();
         loop {
             self.look();
-            if self.processes.iter().all(|process| process.ended.is_some()) {
+            let all = || self.processes.iter().chain(&self.candidates);
+            if all().all(|process| process.ended.is_some()) {
                 return;
             }
             if since_asked.elapsed() > GRACE {
@@ -120,7 +188,7 @@ impl Children {
     }
 
     fn kill(&mut self) {
-        for process in &mut self.processes {
+        for process in self.processes.iter_mut().chain(&mut self.candidates) {
             process.kill();
         }
     }
@@ -133,6 +201,21 @@ impl Drop for Children {
 }
 
 impl ServiceProcess {
+    /// How it ended, if it has.
+    pub fn look(&mut self) -> Option<Ended> {
+        if self.ended.is_none()
+            && let Ok(Some(status)) = self.child.try_wait()
+        {
+            self.ended = Some(Ended { status, by_us: false });
+        }
+        self.ended
+    }
+
+    /// The signal that it died of.
+    pub fn signal(&self) -> Option<i32> {
+        self.ended.and_then(|ended| ended.status.signal())
+    }
+
     fn kill(&mut self) {
         if self.ended.is_none() {
             // It fails for a process that has just ended, which is what we want.
@@ -153,7 +236,8 @@ impl ServiceProcess {
 
 /// Starts a process whose every word goes to a file, and which dies with the thread that calls this.
 pub(crate) fn start(mut command: Command, log: &Path) -> io::Result<Child> {
-    let log = File::create(log)?;
+    // After what its predecessors said.
+    let log = OpenOptions::new().create(true).append(true).open(log)?;
     command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
     // A Ctrl-C at the terminal is for the supervisor, who ends all in order.
     command.process_group(0);

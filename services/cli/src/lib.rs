@@ -24,6 +24,7 @@ mod progress;
 mod pull;
 mod report;
 mod standstill;
+mod succession;
 mod supervisor;
 mod sweep;
 mod table;

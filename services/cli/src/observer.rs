@@ -9,7 +9,9 @@ use crate::progress::Progress;
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
-use mikoshi_observation::{Fault, Figures, LogHash, LogWriter, Observation, Summary, Timing, WriteLogError};
+use mikoshi_observation::{
+    Fault, Figures, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
+};
 
 /// Observes a run: figures, hash, log, progress.
 pub struct RunObserver {
@@ -18,6 +20,7 @@ pub struct RunObserver {
     log: LogWriter,
     progress: Progress,
     stamps: Stamps,
+    swaps: Vec<Swap>,
     ticks: u64,
     clock: Stopwatch,
 }
@@ -35,6 +38,7 @@ impl RunObserver {
             log: LogWriter::create(&out.run_log(), run).map_err(Failure::fault)?,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, is_shown),
             stamps: Stamps::default(),
+            swaps: vec![],
             ticks: 0,
             clock: Stopwatch::start(),
         })
@@ -52,6 +56,11 @@ impl RunObserver {
         self.ticks += 1;
         self.progress.set_ticks(self.ticks);
         Ok(())
+    }
+
+    /// Takes note of a process that was replaced.
+    pub fn note_swap(&mut self, swap: Swap) {
+        self.swaps.push(swap);
     }
 
     /// Ticks observed so far.
@@ -91,7 +100,7 @@ impl RunObserver {
             unintended_contact_ticks: figures.unintended_contact_ticks,
             timing: self.stamps.timing(),
             faults,
-            swaps: vec![],
+            swaps: self.swaps,
         };
         if self.ticks < run.ticks {
             summary.failures.push(format!("the run ended after {} of {} ticks", self.ticks, run.ticks));

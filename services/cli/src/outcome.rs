@@ -4,7 +4,7 @@ use crate::binaries::kind_of;
 use crate::failure::Failure;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
-use mikoshi_observation::Fault;
+use mikoshi_observation::{Fault, Swap};
 use mikoshi_runtime::RunFault;
 
 /// How carrying out a run ended.
@@ -43,6 +43,12 @@ pub(crate) fn label_of(run: &RunSpec, service: ServiceId) -> String {
 pub(crate) fn fault_of(run: &RunSpec, service: ServiceId, tick: u64, code: String) -> Fault {
     let robot = robot_name(run, service).map(str::to_owned);
     Fault { tick, service: kind_of(service).to_owned(), robot, code }
+}
+
+/// What summaries say of a process that was replaced. In lockstep the others wait: no tick is lost.
+pub(crate) fn swap_of(run: &RunSpec, service: ServiceId, tick: u64, cause: String) -> Swap {
+    let robot = robot_name(run, service).map(str::to_owned);
+    Swap { tick, service: kind_of(service).to_owned(), robot, cause, ticks_lost: 0 }
 }
 
 /// The name of the robot that a service controls.

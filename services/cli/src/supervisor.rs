@@ -6,11 +6,12 @@ use crate::children::{Children, Ended, ServiceProcess};
 use crate::failure::{Failure, Status, as_lines};
 use crate::interrupts::Interrupts;
 use crate::observer::RunObserver;
-use crate::outcome::{Outcome, fault_of, label_of, robot_name};
+use crate::outcome::{Outcome, fault_of, label_of, robot_name, swap_of};
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
 use crate::print::print_error;
 use crate::standstill::Standstill;
+use crate::succession::{Succession, Vacancy};
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
@@ -18,8 +19,8 @@ use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Fault, Observation, TeamTap};
 use mikoshi_resolution::{world_file, write_run};
 use mikoshi_runtime::{
-    Board, Domain, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State, TickError,
-    WaitPolicy, required_bytes,
+    Board, Domain, Entry, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State,
+    TickError, WaitPolicy, required_bytes,
 };
 use std::fs;
 use std::path::Path;
@@ -89,6 +90,7 @@ struct Supervisor {
     tap: IceoryxTap,
     team_tap: TeamTap<IceoryxTap>,
     member: Member,
+    succession: Succession,
 }
 
 impl Supervisor {
@@ -96,17 +98,20 @@ impl Supervisor {
         let (run, schedule) = (&prepared.run, &prepared.schedule);
         write_run(directory, run).map_err(Failure::fault)?;
         fs::create_dir_all(logs).map_err(|error| Failure::fault(error).context(logs.display()))?;
-        Board::create(directory, &schedule.services(), true).map_err(Failure::fault)?;
-        let join = |role| Member::join(directory, role, WaitPolicy::default()).map_err(Failure::fault);
+        let board = Board::create(directory, &schedule.services(), true).map_err(Failure::fault)?;
+        let succession = Succession::with_limit(run.scenario.supervision.restart_limit);
+        board.set_succession(succession.is_promised());
+        let join = |role| Member::join(directory, role, WaitPolicy::default(), Entry::Vacant);
+        let join = |role| join(role).map_err(Failure::fault);
         let member = join(Role::Supervisor)?;
         let tap = IceoryxTap::open(directory, join(Role::Tap)?, schedule).map_err(Failure::fault)?;
-        let mut children = Children::default();
+        let mut children = Children::of(directory, logs);
         for service in schedule.services() {
-            children.spawn(service, label_of(run, service), robot_name(run, service), directory, logs)?;
+            children.spawn(service, label_of(run, service), robot_name(run, service))?;
         }
         // While services set themselves up.
         let team_tap = TeamTap::new(&tap, run.robots.len()).map_err(Failure::fault)?;
-        Ok(Self { children, tap, team_tap, member })
+        Ok(Self { children, tap, team_tap, member, succession })
     }
 
     fn watch(&mut self, prepared: &Prepared, observer: &mut RunObserver, interrupts: &Interrupts) -> Watched {
@@ -141,17 +146,64 @@ impl Supervisor {
             if let Some(signal) = interrupts.received() {
                 return Watched::Signal(signal);
             }
-            if self.children.look() || self.any_service_is(State::Failed) {
+            if !self.look_after(&prepared.run, observer) || self.any_service_is(State::Failed) {
                 return Watched::Lost;
             }
             let is_set_up = self.all_services_are(State::Ready);
             let lasted = standstill.look(self.progress(), clock.lap());
             if lasted > if is_set_up { STALL } else { START_STALL } {
                 let culprits = if is_set_up { self.unhindered(prepared) } else { self.least_advanced() };
-                return Watched::Stalled(Stall { lasted, culprits });
+                if !is_set_up || !self.replace_frozen(&culprits) {
+                    return Watched::Stalled(Stall { lasted, culprits });
+                }
+                standstill = Standstill::default();
             }
             pause(LOOK);
         }
+    }
+
+    /// Sees to successors of processes that were killed; `false` if somebody is lost for good.
+    fn look_after(&mut self, run: &RunSpec, observer: &mut RunObserver) -> bool {
+        self.children.look();
+        let fallen = self.children.processes().iter().filter(|process| {
+            let has_failed = process.ended.is_some_and(|ended| !ended.status.success());
+            has_failed && !self.succession.is_due(process.service)
+        });
+        let fallen: Vec<_> = fallen.map(|process| (process.service, process.signal())).collect();
+        for (service, signal) in fallen {
+            let (at, has_said_why) = self.last_position(service);
+            let Some(signal) = signal.filter(|_| !has_said_why) else { return false };
+            if !self.succession.take_note(service, at, format!("killed by signal {signal}")) {
+                return false;
+            }
+        }
+        while let Some(Vacancy { service, at, cause }) = self.succession.next() {
+            if self.children.succeed(service).is_err() {
+                return false;
+            }
+            observer.note_swap(swap_of(run, service, at.tick, cause));
+        }
+        true
+    }
+
+    /// Kills those that are frozen, for their successors' sake; `false` if they may have none.
+    fn replace_frozen(&mut self, culprits: &[ServiceId]) -> bool {
+        let may_all = culprits.iter().all(|&service| {
+            let (at, _) = self.last_position(service);
+            self.succession.take_note(service, at, "frozen".to_owned())
+        });
+        if may_all {
+            self.children.kill_frozen(culprits);
+        }
+        may_all
+    }
+
+    /// Where this service is or was last, and whether it has said why it ended.
+    fn last_position(&self, service: ServiceId) -> (Position, bool) {
+        let board = self.member.board();
+        let at = board.last_position(service).unwrap_or_default();
+        let states = self.service_states();
+        (at, states.into_iter().any(|(other, state)| other == service && state == State::Failed))
     }
 
     /// Ends what still runs, and says what came of it.

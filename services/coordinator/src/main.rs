@@ -9,7 +9,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments = ServiceArguments::parse();
     serve(
-        &arguments.run,
+        &arguments.place,
         |_| Ok(ServiceId::Coordinator),
         |run, transport| CoordinatorParticipant::new(run, transport).map_err(ServeError::configuration),
     )

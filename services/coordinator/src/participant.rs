@@ -1,17 +1,20 @@
 //! The coordinator on a transport.
 
 use crate::build::BuildCoordinatorError;
-use crate::tick::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState};
+use crate::tick::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState, STATE_VERSION};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Frame, RobotState, ServiceId, TeamCommand, TeamState};
-use mikoshi_runtime::{Call, Loan, Participant, Publisher, Subscriber, TickError, Transport};
+use mikoshi_ipc_types::{Frame, Payload, RobotState, ServiceId, TeamCommand, TeamState};
+use mikoshi_runtime::{
+    Call, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, state_schema,
+};
 
 /// The coordinator with its ports.
 pub struct CoordinatorParticipant<T: Transport> {
     coordinator: Coordinator,
     state: CoordinatorState,
     scratch: CoordinatorScratch,
-    outputs: CoordinatorOutputs,
+    /// Of the last ticks, tick k at place k mod their number: as many as some robot may still wait for.
+    outputs: Vec<CoordinatorOutputs>,
     robot_states: Vec<Frame<RobotState>>,
     robot_state_ports: Vec<T::Subscriber<RobotState>>,
     command_ports: Vec<T::Publisher<TeamCommand>>,
@@ -29,7 +32,7 @@ impl<T: Transport> CoordinatorParticipant<T> {
         Ok(Self {
             state: coordinator.initial_state()?,
             scratch: coordinator.scratch(),
-            outputs: CoordinatorOutputs::default(),
+            outputs: vec![CoordinatorOutputs::default(); run.scenario.coordination_delay_ticks as usize + 1],
             robot_states: vec![Frame::zeroed(); run.robots.len()],
             robot_state_ports: robots.clone().map(|r| transport.subscriber(r)).collect::<Result<_, _>>()?,
             command_ports: robots.map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
@@ -43,14 +46,16 @@ impl<T: Transport> CoordinatorParticipant<T> {
             port.receive(tick, frame)?;
         }
         let robots = self.robot_states.iter().map(|frame| &frame.payload);
+        let outputs = of_tick(&mut self.outputs, tick)?;
         self.coordinator
-            .tick(tick, &mut self.state, &mut self.scratch, robots, &mut self.outputs)
-            .map_err(|error| TickError::Service(error.text()))?;
-        for (port, command) in self.command_ports.iter_mut().zip(&self.outputs.commands) {
-            send(port, tick, command)?;
-        }
-        send(&mut self.team_state_port, tick, &self.outputs.team_state)
+            .tick(tick, &mut self.state, &mut self.scratch, robots, outputs)
+            .map_err(|error| TickError::Service(error.text()))
     }
+}
+
+fn of_tick(outputs: &mut [CoordinatorOutputs], tick: u64) -> Result<&mut CoordinatorOutputs, TickError> {
+    let place = (tick as usize).checked_rem(outputs.len());
+    place.and_then(|place| outputs.get_mut(place)).ok_or(TickError::Service("no room for outputs"))
 }
 
 impl<T: Transport> Participant for CoordinatorParticipant<T> {
@@ -58,20 +63,68 @@ impl<T: Transport> Participant for CoordinatorParticipant<T> {
         ServiceId::Coordinator
     }
 
-    fn execute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+    fn compute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
         match call {
             Call::Coordinate => self.coordinate(tick),
             _ => Err(TickError::UnknownCall),
         }
     }
+
+    fn publish(&mut self, _: Call, tick: u64) -> Result<(), TickError> {
+        let outputs = of_tick(&mut self.outputs, tick)?;
+        for (port, command) in self.command_ports.iter_mut().zip(&outputs.commands) {
+            port.send(tick, command)?;
+        }
+        self.team_state_port.send(tick, &outputs.team_state)
+    }
 }
 
-fn send<P: mikoshi_ipc_types::Payload>(
-    port: &mut impl Publisher<P>,
-    tick: u64,
-    payload: &P,
-) -> Result<(), TickError> {
-    let mut loan = port.loan(tick)?;
-    *loan.payload_mut() = *payload;
-    loan.send()
+impl<T: Transport> CoordinatorParticipant<T> {
+    /// State and outputs as bytes: all that a checkpoint holds.
+    fn parts(&mut self) -> impl Iterator<Item = &mut [u8]> {
+        let robots = self.command_ports.len();
+        let state = bytemuck::bytes_of_mut(&mut self.state);
+        core::iter::once(state).chain(self.outputs.iter_mut().flat_map(move |outputs| outputs.parts(robots)))
+    }
+}
+
+impl<T: Transport> Replaceable for CoordinatorParticipant<T> {
+    fn state_schema(&self) -> u64 {
+        let parts = [
+            TeamCommand::SCHEMA_HASH,
+            TeamState::SCHEMA_HASH,
+            self.command_ports.len() as u64,
+            self.outputs.len() as u64,
+            size_of::<CoordinatorState>() as u64,
+        ];
+        state_schema("coordinator", STATE_VERSION, &parts)
+    }
+
+    fn state_bytes(&self) -> usize {
+        let of_tick = self.command_ports.len() * size_of::<TeamCommand>() + size_of::<TeamState>();
+        size_of::<CoordinatorState>() + self.outputs.len() * of_tick
+    }
+
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
+        let mut length = 0;
+        for part in self.parts() {
+            let room = checkpoint.get_mut(length..length + part.len());
+            room.ok_or(TickError::Checkpoint("no room"))?.copy_from_slice(part);
+            length += part.len();
+        }
+        Ok(length)
+    }
+
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
+        if checkpoint.len() != self.state_bytes() {
+            return Err(TickError::Checkpoint("the state has another length"));
+        }
+        let mut rest = checkpoint;
+        for part in self.parts() {
+            let (head, tail) = rest.split_at(part.len());
+            part.copy_from_slice(head);
+            rest = tail;
+        }
+        Ok(())
+    }
 }

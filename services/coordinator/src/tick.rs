@@ -48,6 +48,10 @@ pub struct Coordinator {
     X_WA_start: Pose<World, Object>,
 }
 
+/// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
+/// state that it would misread.
+pub(crate) const STATE_VERSION: u64 = 1;
+
 /// All that matters between ticks.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -336,6 +340,14 @@ impl CoordinatorScratch {
         }
         self.law_output.force.internal.fill(Wrench::from_array(&[nan; 6]));
         self.law_output.position.internal.fill(Twist::from_array(&[nan; 6]));
+    }
+}
+
+impl CoordinatorOutputs {
+    /// Of a team of so many robots, as bytes.
+    pub(crate) fn parts(&mut self, robots: usize) -> [&mut [u8]; 2] {
+        let (commands, _) = self.commands.split_at_mut(robots.min(MAX_ROBOTS));
+        [bytemuck::cast_slice_mut(commands), bytemuck::bytes_of_mut(&mut self.team_state)]
     }
 }
 

@@ -2,31 +2,53 @@
 //!
 //! A service's own `main.rs` only says which service it is and how it is built.
 
-use clap::Parser;
+use clap::{Args, Parser};
 use core::fmt::Display;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
-use mikoshi_resolution::{read_run, tick_schedule};
+use mikoshi_resolution::{read_run, read_spec, tick_schedule};
 use mikoshi_runtime::{
-    IceoryxTransport, Member, OnMissingRight, Participant, RealTime, Role, TickError, WaitPolicy, run_service,
+    Entry, IceoryxTransport, Member, OnMissingRight, RealTime, Replaceable, Role, TickError, WaitPolicy,
+    run_service,
 };
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// Where a service takes part.
+#[derive(Debug, Args)]
+pub struct Place {
+    /// Directory of the run, as its supervisor made it
+    #[arg(long, value_name = "DIR")]
+    run: PathBuf,
+    /// Take over from the process that is in charge, once ready to
+    #[arg(long)]
+    replace: bool,
+    /// Description of the run, if it is to be another than the run began with
+    #[arg(long, value_name = "FILE")]
+    spec: Option<PathBuf>,
+}
+
+impl Place {
+    /// The run's directory.
+    pub fn run(&self) -> &Path {
+        &self.run
+    }
+}
+
 /// Arguments of a service of which a run has one.
 #[derive(Debug, Parser)]
 pub struct ServiceArguments {
-    /// Directory of the run, as its supervisor made it
-    #[arg(long, value_name = "DIR")]
-    pub run: PathBuf,
+    /// Where it takes part.
+    #[command(flatten)]
+    pub place: Place,
 }
 
 /// Arguments of a service of which every robot has one.
 #[derive(Debug, Parser)]
 pub struct RobotServiceArguments {
-    /// Directory of the run, as its supervisor made it
-    #[arg(long, value_name = "DIR")]
-    pub run: PathBuf,
+    /// Where it takes part.
+    #[command(flatten)]
+    pub place: Place,
     /// Name of the robot
     #[arg(long, value_name = "NAME")]
     pub robot: String,
@@ -55,14 +77,14 @@ impl ServeError {
     }
 }
 
-/// Runs a service of the run in directory `run` from its first tick to its last: `service` finds out
-/// which it is, `build` builds it on its ports.
-pub fn serve<P: Participant>(
-    run: &Path,
+/// Runs a service in its place, from the first tick or from where its predecessor was to the last: `service`
+/// finds out which it is, `build` builds it on its ports.
+pub fn serve<P: Replaceable>(
+    place: &Place,
     service: impl FnOnce(&RunSpec) -> Result<ServiceId, ServeError>,
     build: impl FnOnce(&RunSpec, &IceoryxTransport) -> Result<P, ServeError>,
 ) -> ExitCode {
-    match try_serve(run, service, build) {
+    match try_serve(place, service, build) {
         Ok(()) => ExitCode::SUCCESS,
         Err(ServeError { status, message }) => {
             eprintln!("error: {message}");
@@ -71,12 +93,17 @@ pub fn serve<P: Participant>(
     }
 }
 
-fn try_serve<P: Participant>(
-    directory: &Path,
+fn try_serve<P: Replaceable>(
+    place: &Place,
     service: impl FnOnce(&RunSpec) -> Result<ServiceId, ServeError>,
     build: impl FnOnce(&RunSpec, &IceoryxTransport) -> Result<P, ServeError>,
 ) -> Result<(), ServeError> {
-    let run = read_run(directory).map_err(ServeError::fault)?;
+    let directory = place.run();
+    let run = match &place.spec {
+        Some(file) => read_spec(file),
+        None => read_run(directory),
+    };
+    let run = run.map_err(ServeError::fault)?;
     let schedule = tick_schedule(&run).map_err(ServeError::configuration)?;
     let service = service(&run)?;
     let core = schedule.phases_of(service).find_map(|phase| phase.core);
@@ -89,14 +116,15 @@ fn try_serve<P: Participant>(
     for missing in real_time.apply().map_err(ServeError::fault)? {
         eprintln!("warning: {missing}");
     }
-    let member =
-        Member::join(directory, Role::Service(service), WaitPolicy::default()).map_err(ServeError::fault)?;
+    let entry = if place.replace { Entry::Replace } else { Entry::Vacant };
+    let member = Member::join(directory, Role::Service(service), WaitPolicy::default(), entry);
+    let member = member.map_err(ServeError::fault)?;
     let transport = IceoryxTransport::open(directory, member, &schedule).map_err(ServeError::fault)?;
     let mut participant = build(&run, &transport)?;
     match run_service(&schedule, &mut participant, &transport, run.ticks) {
         Ok(_) => Ok(()),
-        // Asked to stop is not a fault of this service.
-        Err(fault) if fault.error == TickError::Stopped => Ok(()),
+        // Neither is a fault of this service.
+        Err(fault) if matches!(fault.error, TickError::Stopped | TickError::Retired) => Ok(()),
         Err(fault) => Err(ServeError::fault(fault)),
     }
 }

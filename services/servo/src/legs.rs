@@ -14,6 +14,7 @@ use mikoshi_humanoid::gait::{
 use mikoshi_ipc_types::MAX_HANDS;
 use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Gait and stabiliser of one robot. Immutable.
 #[derive(Clone, Debug)]
@@ -30,7 +31,7 @@ pub(crate) struct Legs {
 }
 
 /// All of it that matters between ticks.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LegsState {
     gait: GaitState,
     stabiliser: StabiliserState,
@@ -46,7 +47,7 @@ pub(crate) struct LegsState {
 }
 
 /// What a robot feels in a tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Felt {
     /// Centre of mass \[m, world\].
     pub com: Vector2<f64>,

@@ -7,7 +7,7 @@ use mikoshi_servo::ServoParticipant;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let RobotServiceArguments { run: directory, robot: name } = RobotServiceArguments::parse();
+    let RobotServiceArguments { place, robot: name } = RobotServiceArguments::parse();
     let index_of = |run: &mikoshi_config::RunSpec| {
         run.robots.iter().position(|robot| robot.member.name == name).ok_or_else(|| {
             let known: Vec<&str> = run.robots.iter().map(|robot| robot.member.name.as_str()).collect();
@@ -18,7 +18,7 @@ fn main() -> ExitCode {
         })
     };
     serve(
-        &directory,
+        &place,
         |run| Ok(ServiceId::Servo(index_of(run)?)),
         |run, transport| {
             ServoParticipant::new(run, index_of(run)?, transport).map_err(ServeError::configuration)

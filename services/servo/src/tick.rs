@@ -15,6 +15,7 @@ use mikoshi_ipc_types::{
 };
 use mikoshi_spatial::{Hand, Pose, Sensor, Twist, World, Wrench};
 use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Share of its weight below which a robot has no zero moment point to speak of.
 const LEAST_GROUND_FORCE: f64 = 0.1;
@@ -29,8 +30,12 @@ pub struct Servo {
     initial: ServoState,
 }
 
+/// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
+/// would misread.
+pub(crate) const STATE_VERSION: u64 = 1;
+
 /// All that matters between ticks.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ServoState {
     ik: IkState,
     base: BaseEstimatorState,
@@ -111,6 +116,11 @@ impl Servo {
     /// The state at tick 0.
     pub fn initial_state(&self) -> ServoState {
         self.initial
+    }
+
+    /// Joints of its robot.
+    pub fn joint_count(&self) -> usize {
+        self.robot.model.joint_count()
     }
 
     /// Workspaces of its size.

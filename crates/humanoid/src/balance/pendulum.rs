@@ -2,6 +2,7 @@
 
 use mikoshi_spatial::{World, Wrench};
 use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Standard gravity \[m/s²\].
 pub const GRAVITY_M_S2: f64 = 9.81;
@@ -51,7 +52,7 @@ impl Pendulum {
 ///
 /// with pz over the ground. Source: Murooka et al., "Humanoid Loco-Manipulations Pattern Generation
 /// and Stabilization Control", RA-L 2021, eqs. 3 to 6; Audren et al., IROS 2014.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExternalLoad {
     /// κ: share of the weight that the feet bear, above one when the robot carries.
     pub kappa: f64,

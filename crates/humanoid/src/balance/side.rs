@@ -1,9 +1,10 @@
 //! The two sides of a robot, and one value for each.
 
 use core::ops::{Index, IndexMut};
+use serde::{Deserialize, Serialize};
 
 /// A side of one robot, seen by itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Side {
     /// Right: negative y of the robot.
     Right,
@@ -40,7 +41,7 @@ impl Side {
 
 /// A value for each foot.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PerFoot<T> {
     /// Of the right foot.
     pub right: T,

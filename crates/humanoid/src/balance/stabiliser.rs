@@ -11,6 +11,7 @@ use super::{ExternalLoad, Pendulum, PerFoot, Side};
 use crate::estimate::{SoleRectangle, SupportPolygon};
 use mikoshi_spatial::{Foot, Pose, Twist, World, Wrench};
 use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Everything that is constant over a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +79,7 @@ impl StabiliserConfig {
 
 /// All that matters from tick to tick: floats only, without padding.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StabiliserState {
     /// Leaky integral of the divergent component's error \[m s, world\].
     pub dcm_error_integral: Vector2<f64>,

@@ -5,6 +5,7 @@ use crate::kinematics::Kinematics;
 use crate::model::{FrameId, Model};
 use mikoshi_spatial::{Base, Foot, Pose, Sensor, Twist, World, exp, log};
 use nalgebra::{UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Estimator of the base's pose: a complementary filter for the attitude, and the stance feet for the
 /// position.
@@ -52,7 +53,7 @@ impl Default for BaseEstimatorGains {
 }
 
 /// What the estimator remembers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BaseEstimatorState {
     /// Attitude of the IMU in the world.
     pub imu_attitude: UnitQuaternion<f64>,

@@ -14,6 +14,7 @@ use crate::balance::{ExternalLoad, PerFoot, Side};
 use crate::estimate::SoleRectangle;
 use mikoshi_spatial::{Foot, Pose, Twist, World};
 use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// Everything that is constant over a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +73,7 @@ impl GaitConfig {
 }
 
 /// All that matters from tick to tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GaitState {
     /// What the legs do.
     pub phase: GaitPhase,

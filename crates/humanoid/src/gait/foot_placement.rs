@@ -4,12 +4,13 @@ use super::ground_pose::{GroundPose, heading, wrap};
 use crate::balance::PerFoot;
 use mikoshi_spatial::{Hand, Pose, Twist, World};
 use nalgebra::{UnitQuaternion, Vector2};
+use serde::{Deserialize, Serialize};
 
 /// Most hands of one robot.
 pub const MAX_HANDS: usize = 4;
 
 /// The hands' centre on the ground, and how it moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandCentre {
     /// Projection of the mean of the hands' positions; its heading is that of the grasp turned by the
     /// mean of what the hands have turned since.
@@ -34,7 +35,7 @@ impl HandCentre {
 ///
 /// Heading comes from the hands' attitudes and not from the line between them: it is defined for one
 /// hand, and internal forces that pull a hand by centimetres don't turn the feet.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FootPlacement {
     pub(super) hand_rotation_at_grasp: [UnitQuaternion<f64>; MAX_HANDS],
     pub(super) hand_count: usize,

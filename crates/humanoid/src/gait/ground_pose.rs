@@ -3,10 +3,11 @@
 use core::f64::consts::{PI, TAU};
 use mikoshi_spatial::{CoordinateFrame, Pose, World};
 use nalgebra::{Rotation2, UnitQuaternion, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// The projection of a pose to the ground plane: position and heading. As a rigid motion of the
 /// plane it composes like any pose: `X_AC = X_AB.then(X_BC)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GroundPose {
     /// \[m\].
     pub position: Vector2<f64>,

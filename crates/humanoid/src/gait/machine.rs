@@ -20,9 +20,10 @@ use super::step_clock::{StepClock, StepTiming};
 use super::swing::{Foothold, Swing, SwingConfig, SwingContact};
 use crate::balance::{PerFoot, Side};
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 /// The step that comes next; until lift-off it follows the moving references.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedStep {
     /// Index in the walk.
     pub index: u64,
@@ -33,7 +34,7 @@ pub struct PlannedStep {
 }
 
 /// A foot that is in the air or has just left it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SwingingFoot {
     /// Which one.
     pub side: Side,
@@ -42,7 +43,7 @@ pub struct SwingingFoot {
 }
 
 /// What the robot's legs do.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum GaitPhase {
     /// On both feet.
     Standing {

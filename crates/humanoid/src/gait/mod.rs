@@ -22,7 +22,6 @@ mod step_clock;
 mod step_planner;
 mod swing;
 mod team_clock;
-mod words;
 mod zmp_reference;
 
 pub use controller::{FootReference, Gait, GaitConfig, GaitInputs, GaitReference, GaitState};
@@ -36,5 +35,4 @@ pub use step_clock::{StepClock, StepTiming};
 pub use step_planner::StepLimits;
 pub use swing::{Foothold, Swing, SwingConfig, SwingContact, quintic, swing_foot};
 pub use team_clock::{StepWish, TeamClock};
-pub use words::GAIT_STATE_WORDS;
 pub use zmp_reference::ZmpReference;

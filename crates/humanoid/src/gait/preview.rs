@@ -3,6 +3,7 @@
 use super::riccati::{feedback_gain, solve_discrete_riccati};
 use crate::balance::GRAVITY_M_S2;
 use nalgebra::{Matrix3, Matrix4, RowVector3, Vector2, Vector3, Vector4};
+use serde::{Deserialize, Serialize};
 
 /// What the gains follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +49,7 @@ pub enum SolvePreviewError {
 
 /// Centre of mass on its plane, world axes: the cart's state, and the integrated error of the zero
 /// moment point.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PreviewState {
     /// c \[m\].
     pub com: Vector2<f64>,

@@ -1,6 +1,7 @@
 //! The team's step clock: plain data that says what every robot does in a tick.
 
 use crate::balance::Side;
+use serde::{Deserialize, Serialize};
 
 /// How many ticks each part of a walk lasts; the same for the whole team.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +58,7 @@ impl StepTiming {
 }
 
 /// What the whole team does in one tick. A step is a weight shift and the swing that follows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StepClock {
     /// Nobody steps.
     #[default]

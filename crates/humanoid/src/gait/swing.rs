@@ -3,9 +3,10 @@
 use super::ground_pose::{GroundPose, wrap};
 use mikoshi_spatial::{Foot, Pose, Twist, World};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// Where a foot is commanded to stand.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Foothold {
     /// On the ground plane.
     pub pose: GroundPose,
@@ -100,7 +101,7 @@ pub fn swing_foot(
 }
 
 /// How a swinging foot stands with the ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SwingContact {
     /// It swings. `force_ticks`: how long it has felt the ground.
     Swinging {
@@ -120,7 +121,7 @@ pub enum SwingContact {
 }
 
 /// A foot on its way.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Swing {
     /// Where it left.
     pub from: Foothold,

@@ -3,13 +3,14 @@
 use crate::kinematics::joints_of;
 use crate::model::MAX_JOINTS;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 /// The program has no solution: its matrix is not positive definite, or something is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SolveQuadraticError;
 
 /// Variables held at a bound.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct ActiveSet {
     pub lower: u64,
     pub upper: u64,

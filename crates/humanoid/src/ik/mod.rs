@@ -22,6 +22,8 @@ use crate::model::{FrameId, MAX_HANDS, MAX_JOINTS, Model};
 use bounded_quadratic::{ActiveSet, BoundedQuadratic};
 use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, log};
 use nalgebra::{Matrix3xX, Matrix6xX, UnitQuaternion, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
 use thiserror::Error;
 
 /// What one tick's linearization leaves of an error that it could undo \[m and rad\].
@@ -123,11 +125,13 @@ pub enum ConfigureIkError {
 pub struct SolveIkError;
 
 /// The commanded posture, and what the next tick starts from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IkState {
     /// Commanded joint positions \[rad or m\]; zero past the model's joints.
+    #[serde(with = "BigArray")]
     pub joint_position: [f64; MAX_JOINTS],
     /// The last tick's increment per period \[rad/s or m/s\].
+    #[serde(with = "BigArray")]
     pub joint_velocity: [f64; MAX_JOINTS],
     active: ActiveSet,
     residual: Residual,
@@ -150,7 +154,7 @@ impl IkState {
 }
 
 /// What each task lacked after the last tick, at most one step of each: linear \[m\], angular \[rad\].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Residual {
     com: [f64; 2],
     waist: [f64; 2],

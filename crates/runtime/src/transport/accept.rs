@@ -1,6 +1,7 @@
 //! What a receiver makes of a frame that came from outside.
 
-use crate::{TickError, Topic};
+use crate::board::Charge;
+use crate::{Position, TickError, Topic};
 use core::cmp::Ordering;
 use mikoshi_ipc_types::{Frame, Payload};
 
@@ -13,11 +14,13 @@ pub(crate) enum Verdict {
     PassOver,
 }
 
-/// Judges a frame that has been copied out of shared memory.
+/// Judges a frame that has been copied out of shared memory. It was published in this phase of its
+/// publisher, for which `charge` says who speaks.
 pub(crate) fn judge<P: Payload>(
     frame: &Frame<P>,
     topic: Topic,
-    announced_epoch: u64,
+    phase: usize,
+    charge: Charge,
     expected_tick: u64,
 ) -> Result<Verdict, TickError> {
     let envelope = &frame.envelope;
@@ -27,12 +30,15 @@ pub(crate) fn judge<P: Payload>(
     if envelope.robot != topic.robot as u64 {
         return Err(TickError::WrongRobot { topic, found: envelope.robot });
     }
-    match envelope.epoch.cmp(&announced_epoch) {
-        Ordering::Less => return Ok(Verdict::PassOver),
-        Ordering::Greater => {
-            return Err(TickError::WrongEpoch { topic, announced: announced_epoch, found: envelope.epoch });
+    match envelope.epoch.cmp(&charge.epoch) {
+        // What a predecessor said before it lost its place counts; the rest its successor says again.
+        Ordering::Less if Position { tick: envelope.tick, phase } >= charge.since => {
+            return Ok(Verdict::PassOver);
         }
-        Ordering::Equal => {}
+        Ordering::Greater => {
+            return Err(TickError::WrongEpoch { topic, announced: charge.epoch, found: envelope.epoch });
+        }
+        Ordering::Less | Ordering::Equal => {}
     }
     match envelope.tick.cmp(&expected_tick) {
         Ordering::Less => return Ok(Verdict::PassOver),

@@ -6,7 +6,9 @@
 use super::iceoryx::{IceoryxLoan, IceoryxTap, IceoryxTransport};
 use super::memory::{InMemoryHub, InMemoryLoan, InMemoryTap, InMemoryTransport};
 use super::{ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport};
-use crate::{Board, Member, Placement, Role, RunDirectory, TickError, TickSchedule, Topic, WaitPolicy};
+use crate::{
+    Board, Entry, Member, Placement, Role, RunDirectory, TickError, TickSchedule, Topic, WaitPolicy,
+};
 use core::cell::RefCell;
 use mikoshi_ipc_types::{
     Envelope, Frame, JointCommand, ObjectTruth, Payload, RobotState, Sensors, ServiceId, TeamCommand,
@@ -71,7 +73,8 @@ struct Iceoryx {
 
 impl Iceoryx {
     fn member(&self, role: Role) -> Member {
-        Member::join(self.run.path(), role, WaitPolicy::default()).expect("a place on the board")
+        Member::join(self.run.path(), role, WaitPolicy::default(), Entry::Vacant)
+            .expect("a place on the board")
     }
 
     /// Ends a service whose ports have been dropped.

@@ -8,13 +8,13 @@ use super::{
     ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport, consumer_depth,
 };
 use crate::board::{Role, State};
+use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
 use crate::member::{Member, TAP_LEAD_TICKS};
 use crate::shared_memory::populate;
 use crate::wait::Reason;
-use crate::{Domain, DomainError, Position, Session, TickError, TickSchedule, Topic};
+use crate::{Domain, DomainError, Position, Replaceable, Session, TickError, TickSchedule, Topic};
 use core::cell::{Cell, RefCell};
 use core::mem::MaybeUninit;
-use core::sync::atomic::Ordering;
 use iceoryx2::port::LoanError;
 use iceoryx2::port::publisher::Publisher as IceoryxPort;
 use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriberPort;
@@ -24,7 +24,7 @@ use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
 use rustix::time::{ClockId, clock_gettime};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 /// Processes that may publish a topic at a time: the one in charge, a standby, and a predecessor that
@@ -87,9 +87,23 @@ pub(super) struct Process {
     node: Node<ipc::Service>,
     member: Member,
     schedule: TickSchedule,
+    run: PathBuf,
     domain: Domain,
-    /// All ports, to be connected before the first tick.
-    ports: RefCell<Vec<Rc<dyn UpdateConnections>>>,
+    ports: Ports,
+}
+
+/// All ports of a process, to be connected before the first tick and whenever a process has taken another
+/// one's place: what a publisher has kept for latecomers they get when it looks who is there.
+#[derive(Clone, Default)]
+struct Ports(Rc<RefCell<Vec<Rc<dyn UpdateConnections>>>>);
+
+impl Ports {
+    fn connect(&self) {
+        for port in self.0.borrow().iter() {
+            // A port that can't be connected now tries again at its next frame, and fails there.
+            let _ = port.update_connections();
+        }
+    }
 }
 
 impl Process {
@@ -99,7 +113,7 @@ impl Process {
         let domain = Domain::of(run);
         let mut config = domain.config()?;
         // A successor makes room for its ports.
-        config.global.node.cleanup_dead_nodes_on_creation = member.epoch() > 1;
+        config.global.node.cleanup_dead_nodes_on_creation = member.is_successor();
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -108,7 +122,11 @@ impl Process {
                 path: run.display().to_string(),
                 reason: error.to_string(),
             })?;
-        Ok(Rc::new(Self { node, member, schedule: schedule.clone(), domain, ports: RefCell::default() }))
+        let ports = Ports::default();
+        let to_connect = ports.clone();
+        member.on_successor(move || to_connect.connect());
+        let run = run.to_path_buf();
+        Ok(Rc::new(Self { node, member, schedule: schedule.clone(), run, domain, ports }))
     }
 
     fn service<P: Payload>(&self, topic: Topic) -> Result<Factory<P>, ConnectError> {
@@ -150,7 +168,7 @@ impl Process {
 
     fn keep<T: UpdateConnections + 'static>(&self, port: T) -> Rc<T> {
         let port = Rc::new(port);
-        self.ports.borrow_mut().push(Rc::clone(&port) as Rc<dyn UpdateConnections>);
+        self.ports.0.borrow_mut().push(Rc::clone(&port) as Rc<dyn UpdateConnections>);
         port
     }
 
@@ -164,10 +182,7 @@ impl Process {
 
     /// Connects all ports to those that others have.
     pub(super) fn connect(&self) {
-        for port in self.ports.borrow().iter() {
-            // A port that can't be connected now tries again at its next frame, and fails there.
-            let _ = port.update_connections();
-        }
+        self.ports.connect();
     }
 
     /// Meets all others once they have their ports, connects to them, and touches all memory.
@@ -175,6 +190,11 @@ impl Process {
         self.member.meet(State::Wired)?;
         self.member.watch_all();
         self.connect();
+        self.touch()
+    }
+
+    /// Touches all memory that its ports share with those of others.
+    fn touch(&self) -> Result<(), TickError> {
         let files = self.domain.shared_memory_files().unwrap_or_default();
         populate(&files).map_err(|_| TickError::SharedMemoryFull)
     }
@@ -189,6 +209,8 @@ pub struct IceoryxTransport {
     service: ServiceId,
     /// Whether its phase opens the tick: then it also keeps the run within the tap's reach.
     opens_tick: bool,
+    /// Once the session has started.
+    checkpoint: Rc<RefCell<Option<CheckpointWriter>>>,
 }
 
 impl IceoryxTransport {
@@ -202,7 +224,8 @@ impl IceoryxTransport {
     pub fn open(run: &Path, member: Member, schedule: &TickSchedule) -> Result<Self, OpenError> {
         let Role::Service(service) = member.role() else { panic!("{} has no ports", member.role()) };
         let opens_tick = schedule.phases().first().is_some_and(|phase| phase.service == service);
-        Ok(Self { process: Process::open(run, member, schedule)?, service, opens_tick })
+        let process = Process::open(run, member, schedule)?;
+        Ok(Self { process, service, opens_tick, checkpoint: Rc::default() })
     }
 
     /// Its place on the board.
@@ -211,12 +234,44 @@ impl IceoryxTransport {
     }
 }
 
+impl IceoryxTransport {
+    /// Takes the place of a predecessor, once that has made room. Whatever a successor can do before is
+    /// done while the other is in charge; what it can't load it refuses to replace.
+    fn succeed(&self, participant: &mut impl Replaceable) -> Result<Option<Position>, TickError> {
+        let Process { member, .. } = &*self.process;
+        self.process.connect();
+        self.process.touch()?;
+        self.load_latest(participant)?;
+        member.wait_for_vacancy()?;
+        let kept = self.load_latest(participant)?;
+        member.take_charge(kept.unwrap_or_default()).map_err(|_| TickError::Fenced)?;
+        Ok(kept)
+    }
+
+    fn load_latest(&self, participant: &mut impl Replaceable) -> Result<Option<Position>, TickError> {
+        let latest = checkpoint::latest(&self.process.run, self.service);
+        let latest = latest.map_err(|_| TickError::Checkpoint("the predecessor's can't be read"))?;
+        let Some(Checkpoint { position, schema, state }) = latest else { return Ok(None) };
+        if schema != participant.state_schema() {
+            return Err(TickError::Checkpoint("the predecessor's state has another layout"));
+        }
+        participant.load(&state)?;
+        Ok(Some(position))
+    }
+}
+
 impl Session for IceoryxTransport {
-    fn start(&self) -> Result<(), TickError> {
+    fn start(&self, participant: &mut impl Replaceable) -> Result<Option<Position>, TickError> {
+        let Process { member, run, .. } = &*self.process;
+        let kept = if member.is_successor() { self.succeed(participant)? } else { None };
+        let (schema, bytes) = (participant.state_schema(), participant.state_bytes());
+        let writer = CheckpointWriter::create(run, self.service, member.epoch(), schema, bytes);
+        let writer = writer.map_err(|_| TickError::SharedMemoryFull)?;
+        self.checkpoint.replace(Some(writer));
         self.process.prepare()?;
-        self.process.member.meet(State::Ready)?;
-        self.process.member.enter(State::Running);
-        Ok(())
+        member.meet(State::Ready)?;
+        member.enter(State::Running);
+        Ok(kept)
     }
 
     fn begin_phase(&self, at: Position) -> Result<(), TickError> {
@@ -227,13 +282,22 @@ impl Session for IceoryxTransport {
         Ok(())
     }
 
+    fn keep(&self, at: Position, participant: &mut impl Replaceable) -> Result<(), TickError> {
+        match &mut *self.checkpoint.borrow_mut() {
+            Some(writer) => writer.write(at, |state| participant.save(state)),
+            None => Err(TickError::Checkpoint("the session has not started")),
+        }
+    }
+
     fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {
         let member = &self.process.member;
         // Nobody takes its ports away while others may still read from them. Observers are not waited
         // for: what they are connected to stays until they have read it.
         let met = outcome.and_then(|()| member.meet(State::Done));
-        if let Err(error) = &met {
-            member.fail(error);
+        match &met {
+            Err(TickError::Retired) => member.retire()?,
+            Err(error) => member.fail(error),
+            Ok(()) => {}
         }
         met
     }
@@ -265,24 +329,18 @@ impl Transport for IceoryxTransport {
             .chain([Role::Tap])
             .filter_map(|role| process.slot_of(role))
             .collect();
-        let epoch = process.member.epoch();
-        Ok(IceoryxPublisher {
-            process: Rc::clone(process),
-            port: process.keep(port),
-            topic,
-            epoch,
-            reason,
-            readers,
-        })
+        Ok(IceoryxPublisher { process: Rc::clone(process), port: process.keep(port), topic, reason, readers })
     }
 
     fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<IceoryxSubscriber<P>, ConnectError> {
         let (topic, service, process) = (Topic::of::<P>(robot), self.service, &self.process);
         let not_an_input = ConnectError::NotAnInput { service, topic };
         let Some(input) = process.schedule.input_of(service, topic) else { return Err(not_an_input) };
-        let (Some(reason), Some(from)) =
-            (process.reason_for(topic), process.slot_of(Role::Service(input.from)))
-        else {
+        let (Some(reason), Some(from), Some(phase)) = (
+            process.reason_for(topic),
+            process.slot_of(Role::Service(input.from)),
+            process.schedule.phase_of(topic),
+        ) else {
             return Err(not_an_input);
         };
         let depth = consumer_depth(&process.schedule, topic);
@@ -293,6 +351,7 @@ impl Transport for IceoryxTransport {
             topic,
             reason,
             from,
+            phase,
             arrived: Box::new(Frame::zeroed()),
         })
     }
@@ -303,7 +362,6 @@ pub struct IceoryxPublisher<P: Payload> {
     process: Rc<Process>,
     port: Rc<IceoryxPort<ipc::Service, Frame<P>, ()>>,
     topic: Topic,
-    epoch: u64,
     reason: Reason,
     readers: Vec<usize>,
 }
@@ -325,7 +383,7 @@ impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
         let mut sample = unsafe { sample.assume_init() };
         sample.payload_mut().envelope = Envelope {
             schema_hash: P::SCHEMA_HASH,
-            epoch: self.epoch,
+            epoch: self.process.member.epoch(),
             tick,
             robot: self.topic.robot as u64,
             stamp_ns: 0,
@@ -366,22 +424,24 @@ pub struct IceoryxSubscriber<P: Payload> {
     reason: Reason,
     /// The publisher's slot.
     from: usize,
+    /// The publisher's phase.
+    phase: usize,
     /// Where frames are copied to before they are looked at: shared memory may change under the eyes.
     arrived: Box<Frame<P>>,
 }
 
 impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
-        let Self { process, port, topic, reason, from, arrived } = self;
-        let announced_epoch =
-            || process.member.board().slots().get(*from).map_or(0, |slot| slot.epoch.load(Ordering::Acquire));
+        let Self { process, port, topic, reason, from, phase, arrived } = self;
+        let slot = process.member.board().slots().get(*from);
+        let slot = slot.ok_or(TickError::TransportFailed { topic: *topic })?;
         process.member.wait_for(*reason, || {
             while let Some(sample) =
                 port.receive().map_err(|_| TickError::TransportFailed { topic: *topic })?
             {
                 **arrived = *sample.payload();
                 drop(sample);
-                if judge(arrived, *topic, announced_epoch(), tick)? == Verdict::Use {
+                if judge(arrived, *topic, *phase, slot.charge(), tick)? == Verdict::Use {
                     return Ok(Some(()));
                 }
             }

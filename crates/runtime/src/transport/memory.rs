@@ -7,15 +7,16 @@ use super::accept::{Verdict, judge};
 use super::{
     ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport, consumer_depth,
 };
-use crate::{TickError, TickSchedule, Topic};
+use crate::board::Charge;
+use crate::{Position, TickError, TickSchedule, Topic};
 use core::any::Any;
 use core::cell::RefCell;
 use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// In one thread nobody is replaced, so there is one epoch.
-const EPOCH: u64 = 1;
+/// In one thread nobody is replaced: one speaks from the first tick on.
+const CHARGE: Charge = Charge { epoch: 1, since: Position { tick: 0, phase: 0 } };
 
 /// Where the services of one thread meet.
 #[derive(Clone)]
@@ -167,7 +168,7 @@ impl<P: Payload> Publisher<P> for InMemoryPublisher<P> {
         self.frame.payload = P::zeroed();
         self.frame.envelope = Envelope {
             schema_hash: P::SCHEMA_HASH,
-            epoch: EPOCH,
+            epoch: CHARGE.epoch,
             tick,
             robot: self.topic.robot as u64,
             stamp_ns: 0,
@@ -204,7 +205,7 @@ impl<P: Payload> Subscriber<P> for InMemorySubscriber<P> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
         let mut queue = self.queue.borrow_mut();
         while let Some(next) = queue.pop() {
-            if judge(next, self.topic, EPOCH, tick)? == Verdict::Use {
+            if judge(next, self.topic, 0, CHARGE, tick)? == Verdict::Use {
                 *frame = *next;
                 return Ok(());
             }

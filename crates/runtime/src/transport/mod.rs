@@ -28,7 +28,10 @@ mod accept;
 #[cfg(test)]
 mod conformance;
 pub mod iceoryx;
+mod in_order;
 pub mod memory;
+
+pub use in_order::InOrder;
 
 use crate::{TickError, TickSchedule, Topic};
 use mikoshi_ipc_types::{Frame, Payload, ServiceId, ServicePayload};
@@ -87,6 +90,16 @@ pub trait Publisher<P: Payload> {
     /// # Errors
     /// [`TickError::PublisherFull`].
     fn loan(&mut self, tick: u64) -> Result<Self::Loan<'_>, TickError>;
+
+    /// Publishes a payload that was made elsewhere.
+    ///
+    /// # Errors
+    /// As [`Publisher::loan`] and [`Loan::send`].
+    fn send(&mut self, tick: u64, payload: &P) -> Result<(), TickError> {
+        let mut loan = self.loan(tick)?;
+        *loan.payload_mut() = *payload;
+        loan.send()
+    }
 }
 
 /// A frame that has been loaned, and is to be filled and sent. What is dropped is not sent.

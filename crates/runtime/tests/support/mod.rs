@@ -6,7 +6,8 @@ use mikoshi_ipc_types::{
     TeamCommand, TeamState,
 };
 use mikoshi_runtime::{
-    Call, ConnectError, Loan, Participant, Publisher, Subscriber, TickError, TickSchedule, Topic, Transport,
+    Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, TickSchedule,
+    Topic, Transport,
 };
 
 type Outputs<T, P> = Vec<<T as Transport>::Publisher<P>>;
@@ -50,14 +51,20 @@ fn publish<P: Payload>(
 }
 
 /// Any service of the team.
-pub enum Double<T: Transport> {
-    /// The world: a number for each robot.
+pub struct Double<T: Transport> {
+    id: ServiceId,
+    ports: Ports<T>,
+    /// The world's: a number for each robot. A servo's: what it sensed, and where it goes. The
+    /// coordinator's: the mean of all it was told in each of its last ticks.
+    numbers: Vec<f64>,
+}
+
+enum Ports<T: Transport> {
     Bridge {
         sensors: Outputs<T, Sensors>,
         truth: Outputs<T, RobotTruth>,
         object: T::Publisher<ObjectTruth>,
         commands: Vec<Inlet<T, JointCommand>>,
-        world: Vec<f64>,
     },
     /// Adds its own index to what it senses and to what it is told.
     Servo {
@@ -66,7 +73,6 @@ pub enum Double<T: Transport> {
         state: T::Publisher<RobotState>,
         command: Inlet<T, TeamCommand>,
         joints: T::Publisher<JointCommand>,
-        sensed: f64,
     },
     /// Tells each robot the mean of all.
     Coordinator {
@@ -80,79 +86,122 @@ impl<T: Transport> Double<T> {
     /// The double of this service.
     pub fn new(schedule: &TickSchedule, transport: &T, id: ServiceId) -> Result<Self, ConnectError> {
         let robots = schedule.services().iter().filter(|service| service.robot().is_some()).count();
-        Ok(match id {
-            ServiceId::Bridge => Self::Bridge {
-                sensors: (0..robots).map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
-                truth: (0..robots).map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
-                object: transport.publisher(0)?,
-                commands: (0..robots)
-                    .map(|r| Inlet::new(transport, schedule, id, r))
-                    .collect::<Result<_, _>>()?,
-                world: vec![1.0; robots],
-            },
-            ServiceId::Servo(robot) => Self::Servo {
-                robot,
-                sensors: Inlet::new(transport, schedule, id, robot)?,
-                state: transport.publisher(robot)?,
-                command: Inlet::new(transport, schedule, id, robot)?,
-                joints: transport.publisher(robot)?,
-                sensed: 0.0,
-            },
-            ServiceId::Coordinator => Self::Coordinator {
-                states: (0..robots)
-                    .map(|r| Inlet::new(transport, schedule, id, r))
-                    .collect::<Result<_, _>>()?,
-                commands: (0..robots).map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
-                team: transport.publisher(0)?,
-            },
-        })
+        let oldest = schedule.phases_of(id).map(|phase| schedule.oldest_use(phase)).max().unwrap_or(0);
+        let (ports, numbers) = match id {
+            ServiceId::Bridge => {
+                let ports = Ports::Bridge {
+                    sensors: (0..robots).map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
+                    truth: (0..robots).map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
+                    object: transport.publisher(0)?,
+                    commands: (0..robots)
+                        .map(|r| Inlet::new(transport, schedule, id, r))
+                        .collect::<Result<_, _>>()?,
+                };
+                (ports, vec![1.0; robots])
+            }
+            ServiceId::Servo(robot) => {
+                let ports = Ports::Servo {
+                    robot,
+                    sensors: Inlet::new(transport, schedule, id, robot)?,
+                    state: transport.publisher(robot)?,
+                    command: Inlet::new(transport, schedule, id, robot)?,
+                    joints: transport.publisher(robot)?,
+                };
+                (ports, vec![0.0; 2])
+            }
+            ServiceId::Coordinator => {
+                let ports = Ports::Coordinator {
+                    states: (0..robots)
+                        .map(|r| Inlet::new(transport, schedule, id, r))
+                        .collect::<Result<_, _>>()?,
+                    commands: (0..robots).map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
+                    team: transport.publisher(0)?,
+                };
+                (ports, vec![0.0; oldest as usize + 1])
+            }
+        };
+        Ok(Self { id, ports, numbers })
     }
 }
 
 impl<T: Transport> Participant for Double<T> {
     fn id(&self) -> ServiceId {
-        match self {
-            Self::Bridge { .. } => ServiceId::Bridge,
-            Self::Servo { robot, .. } => ServiceId::Servo(*robot),
-            Self::Coordinator { .. } => ServiceId::Coordinator,
-        }
+        self.id
     }
 
-    fn execute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
-        match (self, call) {
-            (Self::Bridge { sensors, truth, object, world, .. }, Call::Publish) => {
-                for ((sensors, truth), value) in sensors.iter_mut().zip(truth).zip(&*world) {
-                    publish(sensors, tick, |payload| payload.joint_position_rad[0] = *value)?;
-                    publish(truth, tick, |payload| payload.tilt_rad = *value)?;
-                }
-                publish(object, tick, |payload| payload.pose[0] = world.iter().sum())
-            }
-            (Self::Bridge { commands, world, .. }, Call::Step) => {
-                for (command, value) in commands.iter_mut().zip(world) {
+    fn compute(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        let numbers = &mut self.numbers;
+        match (&mut self.ports, call) {
+            (Ports::Bridge { .. }, Call::Publish) => {}
+            (Ports::Bridge { commands, .. }, Call::Step) => {
+                for (command, value) in commands.iter_mut().zip(numbers) {
                     *value = (*value + command.receive(tick)?.joint_position_ref_rad[0]).sin();
                 }
-                Ok(())
             }
-            (Self::Servo { robot, sensors, state, sensed, .. }, Call::Sense) => {
-                *sensed = sensors.receive(tick)?.joint_position_rad[0] + *robot as f64;
-                publish(state, tick, |payload| payload.com_position_m[0] = *sensed)
+            (Ports::Servo { robot, sensors, .. }, Call::Sense) => {
+                numbers[0] = sensors.receive(tick)?.joint_position_rad[0] + *robot as f64;
             }
-            (Self::Servo { command, joints, sensed, .. }, Call::Act) => {
-                let target = command.receive(tick)?.hand_pose_ref[0][0];
-                publish(joints, tick, |payload| payload.joint_position_ref_rad[0] = target - *sensed)
+            (Ports::Servo { command, .. }, Call::Act) => {
+                numbers[1] = command.receive(tick)?.hand_pose_ref[0][0] - numbers[0];
             }
-            (Self::Coordinator { states, commands, team }, Call::Coordinate) => {
+            (Ports::Coordinator { states, .. }, Call::Coordinate) => {
                 let mut sum = 0.0;
                 for state in states.iter_mut() {
                     sum += state.receive(tick)?.com_position_m[0];
                 }
-                let mean = sum / states.len() as f64;
+                let kept = numbers.len();
+                numbers[tick as usize % kept] = sum / states.len() as f64;
+            }
+            _ => return Err(TickError::UnknownCall),
+        }
+        Ok(())
+    }
+
+    fn publish(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
+        let numbers = &self.numbers;
+        match (&mut self.ports, call) {
+            (Ports::Bridge { sensors, truth, object, .. }, Call::Publish) => {
+                for ((sensors, truth), value) in sensors.iter_mut().zip(truth).zip(numbers) {
+                    publish(sensors, tick, |payload| payload.joint_position_rad[0] = *value)?;
+                    publish(truth, tick, |payload| payload.tilt_rad = *value)?;
+                }
+                publish(object, tick, |payload| payload.pose[0] = numbers.iter().sum())
+            }
+            (Ports::Servo { state, .. }, Call::Sense) => {
+                publish(state, tick, |payload| payload.com_position_m[0] = numbers[0])
+            }
+            (Ports::Servo { joints, .. }, Call::Act) => {
+                publish(joints, tick, |payload| payload.joint_position_ref_rad[0] = numbers[1])
+            }
+            (Ports::Coordinator { commands, team, .. }, Call::Coordinate) => {
+                let mean = numbers[tick as usize % numbers.len()];
                 for command in commands {
                     publish(command, tick, |payload| payload.hand_pose_ref[0][0] = mean)?;
                 }
                 publish(team, tick, |payload| payload.object_pose[0] = mean)
             }
-            _ => Err(TickError::UnknownCall),
+            _ => Ok(()),
         }
+    }
+}
+
+impl<T: Transport> Replaceable for Double<T> {
+    fn state_schema(&self) -> u64 {
+        1
+    }
+
+    fn state_bytes(&self) -> usize {
+        size_of_val(&*self.numbers)
+    }
+
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
+        let bytes = bytemuck::cast_slice::<_, u8>(&self.numbers);
+        checkpoint[..bytes.len()].copy_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
+        bytemuck::cast_slice_mut::<_, u8>(&mut self.numbers).copy_from_slice(checkpoint);
+        Ok(())
     }
 }
