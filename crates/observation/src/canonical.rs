@@ -18,6 +18,32 @@ pub struct Observation {
     pub joint_command: Vec<Frame<JointCommand>>,
 }
 
+/// A payload that every tick has for each robot, or once for the team.
+pub trait Observed: Payload {
+    /// Its frames in a tick, by robot.
+    fn of(observation: &Observation) -> &[Frame<Self>];
+}
+
+macro_rules! observed {
+    ($($payload:ident: $observation:ident => $frames:expr),* $(,)?) => {
+        $(impl Observed for $payload {
+            fn of($observation: &Observation) -> &[Frame<Self>] {
+                $frames
+            }
+        })*
+    };
+}
+
+observed! {
+    Sensors: observation => &observation.sensors,
+    ObjectTruth: observation => core::slice::from_ref(&observation.object_truth),
+    RobotTruth: observation => &observation.robot_truth,
+    RobotState: observation => &observation.robot_state,
+    TeamCommand: observation => &observation.team_command,
+    TeamState: observation => core::slice::from_ref(&observation.team_state),
+    JointCommand: observation => &observation.joint_command,
+}
+
 /// One payload of a tick, as bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct PayloadRef<'a> {

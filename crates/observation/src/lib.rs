@@ -13,7 +13,7 @@ mod summary;
 mod tap;
 mod truth;
 
-pub use canonical::{LogHash, Observation, PayloadRef};
+pub use canonical::{LogHash, Observation, Observed, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError};

@@ -64,10 +64,24 @@ impl LogReader {
     /// # Errors
     /// The file can't be read, is none of ours, or ends before it says of which run it is.
     pub fn open(path: &Path) -> Result<Self, ReadLogError> {
+        Self::open_with(path, true)
+    }
+
+    /// The same, but what is damaged is read as it is, as far as it can be read at all: for those who have
+    /// something to compare it with.
+    ///
+    /// # Errors
+    /// As [`LogReader::open`].
+    pub fn open_unchecked(path: &Path) -> Result<Self, ReadLogError> {
+        Self::open_with(path, false)
+    }
+
+    fn open_with(path: &Path, is_checked: bool) -> Result<Self, ReadLogError> {
         let path = path.to_owned();
         let mut file = File::open(&path).map_err(|source| ReadLogError::Io { path: path.clone(), source })?;
         let options = LinearReaderOptions::default()
-            .with_prevalidate_chunk_crcs(true)
+            .with_prevalidate_chunk_crcs(is_checked)
+            .with_validate_chunk_crcs(is_checked)
             .with_record_length_limit(MAX_RECORD_BYTES);
         let mut records = LinearReader::new_with_options(options);
         let foreign = |found: &str| ReadLogError::RejectFile { path: path.clone(), found: found.to_owned() };

@@ -8,6 +8,7 @@ const EXAMPLES: &str = "\
 Examples:
   mikoshi run config/scenarios/hold.toml
   mikoshi run config/scenarios/hold.toml --seed 3 --set team=two --set object.mass_kg=10
+  mikoshi replay runs/hold-0/run.mcap
   mikoshi report runs/hold-0
   mikoshi sweep config/sweeps/robust.toml
   mikoshi plan config/scenarios/hold.toml
@@ -27,6 +28,20 @@ Exit status:
   2  bad usage or configuration
   3  a fault of the system: a process died or froze, no shared memory, no simulator
   130, 143  interrupted, terminated";
+
+const REPLAY_EXAMPLES: &str = "\
+Examples:
+  mikoshi replay runs/hold-0/run.mcap
+  mikoshi replay runs/hold-0/run.mcap --service A --service coordinator --until 400
+  mikoshi replay runs/hold-0/run.mcap --service A --set balance.stabiliser=false     (what would it have said?)
+
+Every service is executed on the inputs that were recorded, and what it says is compared with what it said,
+payload by payload, to the last bit. Of what differs, the first field is told.
+
+Exit status:
+  0  all is the same
+  1  something differs, or the log is cut or damaged
+  2  bad usage: no log of a run, written by another build";
 
 const REPORT_EXAMPLES: &str = "\
 Examples:
@@ -68,6 +83,9 @@ pub enum Command {
     /// Run a scenario: one process per service, or all of them in one thread
     #[command(after_help = RUN_EXAMPLES)]
     Run(RunArguments),
+    /// Execute the services of a recorded run anew, and compare what they say
+    #[command(after_help = REPLAY_EXAMPLES)]
+    Replay(ReplayArguments),
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
@@ -113,6 +131,23 @@ pub struct RunArguments {
     /// No progress and no table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// `mikoshi replay`.
+#[derive(Args, Debug)]
+pub struct ReplayArguments {
+    /// The log of a run
+    #[arg(value_name = "RUN.MCAP")]
+    pub log: PathBuf,
+    /// A service: bridge, coordinator, or the name of a robot for its servo [default: all]
+    #[arg(long = "service", value_name = "NAME")]
+    pub services: Vec<String>,
+    /// Stop before this tick
+    #[arg(long, value_name = "TICK")]
+    pub until: Option<u64>,
+    /// Put a value in place of the recorded run's
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub overrides: Vec<(String, String)>,
 }
 
 /// `mikoshi report`.

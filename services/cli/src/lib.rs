@@ -1,7 +1,8 @@
-//! The mikoshi command: run, report, sweep, plan, status, doctor.
+//! The mikoshi command: run, replay, report, sweep, plan, status, doctor.
 //!
 //! Two programs share this library: `mikoshi`, which runs a scenario as one process per service, and
-//! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process` becomes.
+//! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process` and `mikoshi replay`
+//! become.
 //! Only the latter links to the simulator: without its library `mikoshi` still starts, and says what is
 //! missing.
 
@@ -22,7 +23,9 @@ pub mod prepare;
 pub mod print;
 mod progress;
 mod pull;
+pub mod replay;
 mod report;
+mod revise;
 mod standstill;
 mod succession;
 mod supervisor;
@@ -30,7 +33,7 @@ mod sweep;
 mod table;
 mod wall_clock;
 
-use arguments::{Arguments, Command, RunArguments};
+use arguments::{Arguments, Command, ReplayArguments, RunArguments};
 use clap::Parser;
 use failure::{Failure, Status, as_lines};
 use std::env;
@@ -44,6 +47,7 @@ pub fn main_of_command() -> ExitCode {
     conclude(match &Arguments::parse().command {
         Command::Run(arguments) if arguments.in_process => become_in_process(),
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
+        Command::Replay(_) => become_in_process(),
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),
@@ -52,11 +56,12 @@ pub fn main_of_command() -> ExitCode {
     })
 }
 
-/// `mikoshi-in-process` reads the same command line; `run` carries out what it asks for. Asked for its
+/// `mikoshi-in-process` reads the same command line; `run` and `replay` carry out what it asks for. Asked for its
 /// version, it says which simulator it has.
 pub fn main_of_in_process(
     simulator: &str,
     run: impl FnOnce(&RunArguments) -> Result<Status, Failure>,
+    replay: impl FnOnce(&ReplayArguments) -> Result<Status, Failure>,
 ) -> ExitCode {
     if env::args_os().skip(1).eq(["--version"]) {
         print::print_out(&format!("{simulator}\n"));
@@ -65,9 +70,10 @@ pub fn main_of_in_process(
     start_logging();
     conclude(match &Arguments::parse().command {
         Command::Run(arguments) => run(arguments),
+        Command::Replay(arguments) => replay(arguments),
         _ => Err(Failure {
             status: Status::Usage,
-            message: "this program only runs scenarios in one thread: use `mikoshi`".to_owned(),
+            message: "this program only runs and replays in one thread: use `mikoshi`".to_owned(),
         }),
     })
 }

@@ -1,7 +1,8 @@
-//! `mikoshi-in-process`: all services of a run in one thread. `mikoshi run --in-process` becomes it.
+//! `mikoshi-in-process`: all services of a run in one thread. `mikoshi run --in-process` and
+//! `mikoshi replay` become it.
 
 use core::ops::ControlFlow;
-use mikoshi::arguments::RunArguments;
+use mikoshi::arguments::{ReplayArguments, RunArguments};
 use mikoshi::commands::run::run;
 use mikoshi::failure::{Failure, Status};
 use mikoshi::interrupts::Interrupts;
@@ -9,10 +10,12 @@ use mikoshi::observer::RunObserver;
 use mikoshi::outcome::Outcome;
 use mikoshi::output_directory::OutputDirectory;
 use mikoshi::prepare::Prepared;
+use mikoshi::replay::replay;
+use mikoshi_config::RunSpec;
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Observation, TeamTap};
-use mikoshi_runtime::{InMemoryHub, Participant, run_in_one_thread};
+use mikoshi_runtime::{InMemoryHub, InMemoryTransport, Participant, run_in_one_thread};
 use mikoshi_servo::ServoParticipant;
 use mikoshi_sim_bridge::{BridgeParticipant, BuildBridgeError, world_xml};
 use mujoco_rs::mujoco_version;
@@ -20,7 +23,11 @@ use std::fs;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    mikoshi::main_of_in_process(&format!("MuJoCo {}", mujoco_version()), run_in_process)
+    mikoshi::main_of_in_process(&format!("MuJoCo {}", mujoco_version()), run_in_process, replay_in_process)
+}
+
+fn replay_in_process(arguments: &ReplayArguments) -> Result<Status, Failure> {
+    replay(arguments, participant)
 }
 
 fn run_in_process(arguments: &RunArguments) -> Result<Status, Failure> {
@@ -68,22 +75,26 @@ fn execute(
 }
 
 fn participants(prepared: &Prepared, hub: &InMemoryHub) -> Result<Vec<Box<dyn Participant>>, Failure> {
-    let run = &prepared.run;
-    let build = |service: ServiceId| -> Result<Box<dyn Participant>, Failure> {
-        let transport = hub.transport(service);
-        Ok(match service {
-            ServiceId::Bridge => {
-                Box::new(BridgeParticipant::new(run, &transport).map_err(|error: BuildBridgeError| {
-                    if error.is_fault() { Failure::fault(error) } else { Failure::usage(error) }
-                })?)
-            }
-            ServiceId::Coordinator => {
-                Box::new(CoordinatorParticipant::new(run, &transport).map_err(Failure::usage)?)
-            }
-            ServiceId::Servo(robot) => {
-                Box::new(ServoParticipant::new(run, robot, &transport).map_err(Failure::usage)?)
-            }
-        })
-    };
-    prepared.schedule.services().into_iter().map(build).collect()
+    let services = prepared.schedule.services().into_iter();
+    services.map(|service| participant(&prepared.run, service, &hub.transport(service))).collect()
+}
+
+fn participant(
+    run: &RunSpec,
+    service: ServiceId,
+    transport: &InMemoryTransport,
+) -> Result<Box<dyn Participant>, Failure> {
+    Ok(match service {
+        ServiceId::Bridge => {
+            Box::new(BridgeParticipant::new(run, transport).map_err(|error: BuildBridgeError| {
+                if error.is_fault() { Failure::fault(error) } else { Failure::usage(error) }
+            })?)
+        }
+        ServiceId::Coordinator => {
+            Box::new(CoordinatorParticipant::new(run, transport).map_err(Failure::usage)?)
+        }
+        ServiceId::Servo(robot) => {
+            Box::new(ServoParticipant::new(run, robot, transport).map_err(Failure::usage)?)
+        }
+    })
 }

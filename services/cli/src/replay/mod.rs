@@ -1,0 +1,136 @@
+//! Executes services of a recorded run anew, on what they were told, and compares what they say.
+
+mod difference;
+mod stage;
+
+use crate::arguments::ReplayArguments;
+use crate::failure::{Failure, Status};
+use crate::outcome::label_of;
+use crate::print::print_out;
+use crate::revise::revise;
+use core::fmt::Write as _;
+use difference::Difference;
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_observation::{LogReader, Observation};
+use mikoshi_resolution::tick_schedule;
+use mikoshi_runtime::{ConnectError, InMemoryTransport, Participant};
+use stage::Stage;
+
+/// What became of a service.
+struct Verdict {
+    service: ServiceId,
+    /// Where it first said something else, or could not go on.
+    first: Option<(u64, Finding)>,
+    /// Ticks in which it said something else.
+    ticks: u64,
+}
+
+/// Why a service is not what it was.
+enum Finding {
+    Differs(Difference),
+    Fails(String),
+}
+
+/// `mikoshi replay`; `build` makes a service of a run on its ports.
+///
+/// # Errors
+/// The log can't be read, or a service that it is asked for can't be made: bad usage.
+pub fn replay(
+    arguments: &ReplayArguments,
+    build: impl Fn(&RunSpec, ServiceId, &InMemoryTransport) -> Result<Box<dyn Participant>, Failure>,
+) -> Result<Status, Failure> {
+    let mut log = LogReader::open_unchecked(&arguments.log).map_err(Failure::usage)?;
+    let recorded = log.run().clone();
+    let run = match arguments.overrides.is_empty() {
+        true => recorded.clone(),
+        false => revise(&recorded, &arguments.overrides)?,
+    };
+    let schedule = tick_schedule(&run).map_err(Failure::usage)?;
+    let services = chosen(&run, schedule.services(), &arguments.services)?;
+    let mut stages = Vec::new();
+    for &service in &services {
+        stages.push(Stage::new(&schedule, service, |transport| build(&run, service, transport))?);
+    }
+    let mut verdicts: Vec<_> =
+        services.iter().map(|&service| Verdict { service, first: None, ticks: 0 }).collect();
+    let mut observation = Observation::for_team(run.robots.len());
+    let mut ticks = 0;
+    while arguments.until.is_none_or(|until| ticks < until)
+        && log.read_tick(&mut observation).map_err(Failure::usage)?
+    {
+        for (stage, verdict) in stages.iter_mut().zip(&mut verdicts) {
+            if !matches!(verdict.first, Some((_, Finding::Fails(_)))) {
+                verdict.take(observation.tick(), stage.execute(&observation));
+            }
+        }
+        ticks += 1;
+    }
+    let is_same = verdicts.iter().all(|verdict| verdict.first.is_none());
+    let told = tell(&run, &verdicts, ticks, log.damage().map(ToString::to_string));
+    print_out(&told);
+    let is_whole = log.damage().is_none();
+    Ok(if is_same && is_whole { Status::Met } else { Status::NotMet })
+}
+
+impl Verdict {
+    fn take(&mut self, tick: u64, executed: Result<Option<Difference>, mikoshi_runtime::TickError>) {
+        let finding = match executed {
+            Ok(None) => return,
+            Ok(Some(difference)) => Finding::Differs(difference),
+            Err(error) => Finding::Fails(error.to_string()),
+        };
+        self.ticks += 1;
+        self.first.get_or_insert((tick, finding));
+    }
+}
+
+fn chosen(run: &RunSpec, services: Vec<ServiceId>, names: &[String]) -> Result<Vec<ServiceId>, Failure> {
+    if names.is_empty() {
+        return Ok(services);
+    }
+    let name_of = |service: &ServiceId| match service.robot().and_then(|robot| run.robots.get(robot)) {
+        Some(robot) => robot.member.name.clone(),
+        None => service.to_string(),
+    };
+    let find = |name: &String| {
+        services.iter().copied().find(|service| name_of(service) == *name).ok_or_else(|| {
+            let expected: Vec<_> = services.iter().map(name_of).collect();
+            Failure::usage(format!("--service: found {name:?}, expected one of {}", expected.join(", ")))
+        })
+    };
+    names.iter().map(find).collect()
+}
+
+fn tell(run: &RunSpec, verdicts: &[Verdict], ticks: u64, damage: Option<String>) -> String {
+    let mut text = String::new();
+    for Verdict { service, first, ticks: differing } in verdicts {
+        let label = label_of(run, *service);
+        // Writing to a String can't fail.
+        let _ = match first {
+            None => writeln!(text, "{label}: the same to the last bit in {ticks} ticks"),
+            Some((tick, Finding::Differs(difference))) => {
+                let robot = run.robots.get(difference.topic.robot).filter(|_| service.robot().is_some());
+                let of_robot =
+                    robot.map_or_else(String::new, |robot| format!(" (robot {})", robot.member.name));
+                writeln!(
+                    text,
+                    "{label}: differs in {differing} of {ticks} ticks, first in tick {tick}{of_robot}: {difference}"
+                )
+            }
+            Some((tick, Finding::Fails(error))) => writeln!(text, "{label}: fails in tick {tick}: {error}"),
+        };
+    }
+    if let Some(damage) = damage {
+        let _ = writeln!(text, "the log is cut or damaged after {ticks} of {} ticks: {damage}", run.ticks);
+    } else if ticks < run.ticks {
+        let _ = writeln!(text, "the log holds {ticks} of {} ticks", run.ticks);
+    }
+    text
+}
+
+impl From<ConnectError> for Failure {
+    fn from(error: ConnectError) -> Self {
+        Self::fault(error)
+    }
+}
