@@ -16,7 +16,7 @@ mod truth;
 pub use canonical::{LogHash, Observation, Observed, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use log::{LogWriter, WriteLogError};
-pub use reader::{LogReader, ReadLogError};
+pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{Fault, InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
 pub use tap::TeamTap;
 pub use truth::{FootTracker, ObjectTracker, TrackedObject, is_loaded};

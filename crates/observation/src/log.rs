@@ -9,7 +9,7 @@ use core::fmt::Write as _;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Field, Scalar};
+use mikoshi_ipc_types::{Field, Scalar, ServiceId};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,6 +20,8 @@ pub(crate) const PROFILE: &str = "mikoshi";
 pub(crate) const ENCODING: &str = "mikoshi";
 /// The attachment that holds the [`RunSpec`].
 pub(crate) const RUN_ATTACHMENT: &str = "run.bin";
+/// Opens the names of attachments that hold the run as one service has it from a tick on.
+pub(crate) const REVISION_PREFIX: &str = "run-from-";
 const BUFFER_BYTES: usize = 1 << 20;
 
 /// Why a log could not be written.
@@ -73,6 +75,27 @@ impl LogWriter {
             let channel = self.writer.add_channel(schema, &topic, ENCODING, &BTreeMap::new())?;
             self.channels.insert((kind.name, robot), channel);
         }
+        Ok(())
+    }
+
+    /// Attaches the run as this service has it from this tick on.
+    ///
+    /// # Errors
+    /// The file can't be written.
+    pub fn write_revision(
+        &mut self,
+        tick: u64,
+        service: ServiceId,
+        run: &RunSpec,
+    ) -> Result<(), WriteLogError> {
+        let bytes = run.encode();
+        self.writer.attach(&Attachment {
+            log_time: tick * self.period_ns,
+            create_time: 0,
+            name: format!("{REVISION_PREFIX}{tick}-{service}.bin"),
+            media_type: "application/octet-stream".to_owned(),
+            data: Cow::Borrowed(&bytes),
+        })?;
         Ok(())
     }
 

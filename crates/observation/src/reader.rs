@@ -3,11 +3,12 @@
 //! What is before a cut or damage is read; [`LogReader::damage`] says afterwards why there is no more.
 
 use crate::canonical::{Kind, Observation, PayloadRef};
-use crate::log::{ENCODING, PROFILE, RUN_ATTACHMENT, schema_of};
+use crate::log::{ENCODING, PROFILE, REVISION_PREFIX, RUN_ATTACHMENT, schema_of};
 use mcap::McapError;
 use mcap::records::{Channel, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mikoshi_config::{DecodeRunError, RunSpec};
+use mikoshi_ipc_types::ServiceId;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read};
@@ -49,6 +50,57 @@ pub struct LogReader {
     payload: Vec<u8>,
     damage: Option<McapError>,
     is_finished: bool,
+}
+
+/// A run as one service has it from a tick on: its process was replaced by one with other settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Revision {
+    /// The first tick of the new process.
+    pub tick: u64,
+    /// Which service.
+    pub service: ServiceId,
+    /// Its run.
+    pub run: RunSpec,
+}
+
+/// All revisions in a log. They lie behind the frames that they matter for: a log that is cut may lack them.
+///
+/// # Errors
+/// As [`LogReader::open`]; a revision that is none.
+pub fn read_revisions(path: &Path) -> Result<Vec<Revision>, ReadLogError> {
+    let robots = LogReader::open(path)?.run().robots.len();
+    let io_error = |source| ReadLogError::Io { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(io_error)?;
+    // Frames stay packed in their chunks.
+    let options =
+        LinearReaderOptions::default().with_emit_chunks(true).with_record_length_limit(MAX_RECORD_BYTES);
+    let mut records = LinearReader::new_with_options(options);
+    let mut revisions = Vec::new();
+    // Where the file is cut or damaged, there is no more to find.
+    while let Some(Ok(event)) = records.next_event() {
+        let (opcode, data) = match event {
+            LinearReadEvent::Record { opcode, data } => (opcode, data),
+            LinearReadEvent::ReadRequest(need) => {
+                feed(&mut records, &mut file, need).map_err(io_error)?;
+                continue;
+            }
+        };
+        let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(opcode, data) else { continue };
+        let Some(name) = header.name.strip_prefix(REVISION_PREFIX) else { continue };
+        let found =
+            name.strip_suffix(".bin").and_then(|name| name.split_once('-')).and_then(|(tick, name)| {
+                let service = ServiceId::of_team(robots).find(|service| service.to_string() == name)?;
+                Some((tick.parse().ok()?, service))
+            });
+        let reject = || ReadLogError::RejectFile {
+            path: path.to_owned(),
+            found: format!("a revision of nobody, {:?}", header.name),
+        };
+        let (tick, service) = found.ok_or_else(reject)?;
+        let decode = |source| ReadLogError::DecodeRun { path: path.to_owned(), source };
+        revisions.push(Revision { tick, service, run: RunSpec::decode(&data).map_err(decode)? });
+    }
+    Ok(revisions)
 }
 
 /// What a channel carries, and whose it is.

@@ -421,6 +421,12 @@ impl Board {
         self.index_of(Role::Service(service)).map(|index| self.slots()[index].position())
     }
 
+    /// Which incarnation of this service is in charge, and since when: the last phase of its predecessor.
+    pub fn charge_of(&self, service: ServiceId) -> Option<(u64, Position)> {
+        let charge = self.index_of(Role::Service(service)).map(|index| self.slots()[index].charge())?;
+        Some((charge.epoch, charge.since))
+    }
+
     /// What all slots say, in order.
     pub fn statuses(&self) -> Vec<SlotStatus> {
         self.slots().iter().filter_map(Slot::status).collect()

@@ -13,6 +13,7 @@ Examples:
   mikoshi sweep config/sweeps/robust.toml
   mikoshi plan config/scenarios/hold.toml
   mikoshi status
+  mikoshi swap A
   mikoshi doctor --clean";
 
 const RUN_EXAMPLES: &str = "\
@@ -42,6 +43,20 @@ Exit status:
   0  all is the same
   1  something differs, or the log is cut or damaged
   2  bad usage: no log of a run, written by another build";
+
+const SWAP_EXAMPLES: &str = "\
+Examples:
+  mikoshi swap A                                       (the servo of robot A)
+  mikoshi swap coordinator --set hybrid.loop_gain=0.04
+  mikoshi swap A --program target/release/mikoshi-servo
+
+The new process starts, makes its ports and reads what the old one keeps; then the old one makes room at the
+next tick, and the new one goes on from there. In lockstep no tick is lost.
+
+Exit status:
+  0  the new process is in charge
+  2  it was refused, and nothing has changed: no such service, a setting that is wrong, or another state
+  3  a fault of the system";
 
 const REPORT_EXAMPLES: &str = "\
 Examples:
@@ -86,6 +101,9 @@ pub enum Command {
     /// Execute the services of a recorded run anew, and compare what they say
     #[command(after_help = REPLAY_EXAMPLES)]
     Replay(ReplayArguments),
+    /// Replace a process of a run by another one, while the run goes on
+    #[command(after_help = SWAP_EXAMPLES)]
+    Swap(SwapArguments),
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
@@ -148,6 +166,22 @@ pub struct ReplayArguments {
     /// Put a value in place of the recorded run's
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub overrides: Vec<(String, String)>,
+}
+
+/// `mikoshi swap`.
+#[derive(Args, Debug)]
+pub struct SwapArguments {
+    /// bridge, coordinator, or the name of a robot for its servo
+    pub service: String,
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
+    /// Put a value in place of the run's, for the new process
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub overrides: Vec<(String, String)>,
+    /// Another build's program
+    #[arg(long, value_name = "FILE")]
+    pub program: Option<PathBuf>,
 }
 
 /// `mikoshi report`.

@@ -28,10 +28,21 @@ pub struct ServiceProcess {
     pub label: String,
     /// The robot that it controls.
     robot: Option<String>,
+    /// What its successors take over, too.
+    variant: Variant,
     /// How it ended, once it has.
     pub ended: Option<Ended>,
     child: Child,
     log: PathBuf,
+}
+
+/// In what a process differs from the others of its kind.
+#[derive(Clone, Debug, Default)]
+pub struct Variant {
+    /// Its description of the run.
+    pub spec: Option<PathBuf>,
+    /// Its program.
+    pub program: Option<PathBuf>,
 }
 
 /// How a process ended.
@@ -65,7 +76,7 @@ impl Children {
     /// Its program is missing or can't be started.
     pub fn spawn(&mut self, service: ServiceId, label: String, robot: Option<&str>) -> Result<(), Failure> {
         let robot = robot.map(str::to_owned);
-        let process = self.start(service, label, robot, &[])?;
+        let process = self.start(service, label, robot, Variant::default(), &[])?;
         self.processes.push(process);
         Ok(())
     }
@@ -78,8 +89,8 @@ impl Children {
         let Some(index) = self.processes.iter().position(|process| process.service == service) else {
             return Ok(());
         };
-        let ServiceProcess { label, robot, .. } = &self.processes[index];
-        self.processes[index] = self.start(service, label.clone(), robot.clone(), &[])?;
+        let ServiceProcess { label, robot, variant, .. } = &self.processes[index];
+        self.processes[index] = self.start(service, label.clone(), robot.clone(), variant.clone(), &[])?;
         Ok(())
     }
 
@@ -87,13 +98,12 @@ impl Children {
     ///
     /// # Errors
     /// As [`Children::spawn`].
-    pub fn nominate(&mut self, service: ServiceId, spec: Option<&Path>) -> Result<(), Failure> {
+    pub fn nominate(&mut self, service: ServiceId, variant: Variant) -> Result<(), Failure> {
         let Some(process) = self.processes.iter().find(|process| process.service == service) else {
             return Ok(());
         };
-        let mut arguments = vec![OsStr::new("--replace")];
-        arguments.extend(spec.iter().flat_map(|file| [OsStr::new("--spec"), file.as_os_str()]));
-        let candidate = self.start(service, process.label.clone(), process.robot.clone(), &arguments)?;
+        let (label, robot) = (process.label.clone(), process.robot.clone());
+        let candidate = self.start(service, label, robot, variant, &[OsStr::new("--replace")])?;
         self.candidates.push(candidate);
         Ok(())
     }
@@ -130,9 +140,13 @@ impl Children {
         service: ServiceId,
         label: String,
         robot: Option<String>,
+        variant: Variant,
         arguments: &[&OsStr],
     ) -> Result<ServiceProcess, Failure> {
-        let program = binaries::find(binaries::name_of(service))?;
+        let program = match &variant.program {
+            Some(program) => program.clone(),
+            None => binaries::find(binaries::name_of(service))?,
+        };
         let file_name = match &robot {
             Some(robot) => format!("servo-{robot}.log"),
             None => format!("{service}.log"),
@@ -143,9 +157,12 @@ impl Children {
         if let Some(robot) = &robot {
             command.args(["--robot", robot]);
         }
+        if let Some(spec) = &variant.spec {
+            command.arg("--spec").arg(spec);
+        }
         let child = start(command, &log)
             .map_err(|error| Failure::fault(error).context(format_args!("{label}: {}", program.display())))?;
-        Ok(ServiceProcess { service, label, robot, ended: None, child, log })
+        Ok(ServiceProcess { service, label, robot, variant, ended: None, child, log })
     }
 
     /// All processes.

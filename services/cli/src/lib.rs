@@ -1,4 +1,4 @@
-//! The mikoshi command: run, replay, report, sweep, plan, status, doctor.
+//! The mikoshi command: run, replay, swap, report, sweep, plan, status, doctor.
 //!
 //! Two programs share this library: `mikoshi`, which runs a scenario as one process per service, and
 //! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process` and `mikoshi replay`
@@ -10,6 +10,7 @@ pub mod arguments;
 mod binaries;
 mod children;
 pub mod commands;
+mod control;
 pub mod failure;
 mod fraction;
 mod gain;
@@ -29,6 +30,7 @@ mod revise;
 mod standstill;
 mod succession;
 mod supervisor;
+mod swaps;
 mod sweep;
 mod table;
 mod wall_clock;
@@ -48,6 +50,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Run(arguments) if arguments.in_process => become_in_process(),
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
         Command::Replay(_) => become_in_process(),
+        Command::Swap(arguments) => commands::swap::swap(arguments).map(|()| Status::Met),
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),

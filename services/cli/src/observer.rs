@@ -9,6 +9,7 @@ use crate::progress::Progress;
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{
     Fault, Figures, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
 };
@@ -61,6 +62,14 @@ impl RunObserver {
     /// Takes note of a process that was replaced.
     pub fn note_swap(&mut self, swap: Swap) {
         self.swaps.push(swap);
+    }
+
+    /// Keeps the description of the run that a service has from a swap on, if it is another. What the log
+    /// can't take now it will not take later either, and says so then.
+    pub fn note_revision(&mut self, swap: &Swap, service: ServiceId, revised: Option<&RunSpec>) {
+        if let Some(run) = revised {
+            let _ = self.log.write_revision(swap.tick, service, run);
+        }
     }
 
     /// Ticks observed so far.

@@ -15,7 +15,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Observation, TeamTap};
-use mikoshi_runtime::{InMemoryHub, InMemoryTransport, Participant, run_in_one_thread};
+use mikoshi_runtime::{InMemoryHub, InMemoryTransport, Replaceable, run_in_one_thread};
 use mikoshi_servo::ServoParticipant;
 use mikoshi_sim_bridge::{BridgeParticipant, BuildBridgeError, world_xml};
 use mujoco_rs::mujoco_version;
@@ -74,7 +74,7 @@ fn execute(
     })
 }
 
-fn participants(prepared: &Prepared, hub: &InMemoryHub) -> Result<Vec<Box<dyn Participant>>, Failure> {
+fn participants(prepared: &Prepared, hub: &InMemoryHub) -> Result<Vec<Box<dyn Replaceable>>, Failure> {
     let services = prepared.schedule.services().into_iter();
     services.map(|service| participant(&prepared.run, service, &hub.transport(service))).collect()
 }
@@ -83,7 +83,7 @@ fn participant(
     run: &RunSpec,
     service: ServiceId,
     transport: &InMemoryTransport,
-) -> Result<Box<dyn Participant>, Failure> {
+) -> Result<Box<dyn Replaceable>, Failure> {
     Ok(match service {
         ServiceId::Bridge => {
             Box::new(BridgeParticipant::new(run, transport).map_err(|error: BuildBridgeError| {

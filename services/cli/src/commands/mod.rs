@@ -5,4 +5,5 @@ pub mod plan;
 pub mod report;
 pub mod run;
 pub mod status;
+pub mod swap;
 pub mod sweep;

@@ -12,9 +12,9 @@ use core::fmt::Write as _;
 use difference::Difference;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
-use mikoshi_observation::{LogReader, Observation};
+use mikoshi_observation::{LogReader, Observation, Revision, read_revisions};
 use mikoshi_resolution::tick_schedule;
-use mikoshi_runtime::{ConnectError, InMemoryTransport, Participant};
+use mikoshi_runtime::{ConnectError, InMemoryTransport, Replaceable, TickError, TickSchedule};
 use stage::Stage;
 
 /// What became of a service.
@@ -38,14 +38,16 @@ enum Finding {
 /// The log can't be read, or a service that it is asked for can't be made: bad usage.
 pub fn replay(
     arguments: &ReplayArguments,
-    build: impl Fn(&RunSpec, ServiceId, &InMemoryTransport) -> Result<Box<dyn Participant>, Failure>,
+    build: impl Fn(&RunSpec, ServiceId, &InMemoryTransport) -> Result<Box<dyn Replaceable>, Failure>,
 ) -> Result<Status, Failure> {
     let mut log = LogReader::open_unchecked(&arguments.log).map_err(Failure::usage)?;
     let recorded = log.run().clone();
-    let run = match arguments.overrides.is_empty() {
-        true => recorded.clone(),
-        false => revise(&recorded, &arguments.overrides)?,
+    let revise_again = |run: &RunSpec| match arguments.overrides.as_slice() {
+        [] => Ok(run.clone()),
+        overrides => revise(run, overrides),
     };
+    let run = revise_again(&recorded)?;
+    let revisions = read_revisions(&arguments.log).map_err(Failure::usage)?;
     let schedule = tick_schedule(&run).map_err(Failure::usage)?;
     let services = chosen(&run, schedule.services(), &arguments.services)?;
     let mut stages = Vec::new();
@@ -59,6 +61,13 @@ pub fn replay(
     while arguments.until.is_none_or(|until| ticks < until)
         && log.read_tick(&mut observation).map_err(Failure::usage)?
     {
+        for Revision { service, run, .. } in revisions.iter().filter(|found| found.tick == observation.tick())
+        {
+            if let Some(index) = services.iter().position(|other| other == service) {
+                let run = revise_again(run)?;
+                stages[index].replace(|transport| build(&run, *service, transport))?;
+            }
+        }
         for (stage, verdict) in stages.iter_mut().zip(&mut verdicts) {
             if !matches!(verdict.first, Some((_, Finding::Fails(_)))) {
                 verdict.take(observation.tick(), stage.execute(&observation));
@@ -67,13 +76,23 @@ pub fn replay(
         ticks += 1;
     }
     let is_same = verdicts.iter().all(|verdict| verdict.first.is_none());
-    let told = tell(&run, &verdicts, ticks, log.damage().map(ToString::to_string));
+    let told = tell(&run, &schedule, &verdicts, ticks, log.damage().map(ToString::to_string));
     print_out(&told);
     let is_whole = log.damage().is_none();
     Ok(if is_same && is_whole { Status::Met } else { Status::NotMet })
 }
 
 impl Verdict {
+    /// What differs first comes first: in a tick, what is published first.
+    fn rank(&self, schedule: &TickSchedule) -> (u64, Option<usize>) {
+        let place = |topic| schedule.outputs().position(|(_, output)| output.topic == topic);
+        match &self.first {
+            None => (u64::MAX, None),
+            Some((tick, Finding::Differs(difference))) => (*tick, place(difference.topic)),
+            Some((tick, Finding::Fails(_))) => (*tick, None),
+        }
+    }
+
     fn take(&mut self, tick: u64, executed: Result<Option<Difference>, mikoshi_runtime::TickError>) {
         let finding = match executed {
             Ok(None) => return,
@@ -102,7 +121,13 @@ fn chosen(run: &RunSpec, services: Vec<ServiceId>, names: &[String]) -> Result<V
     names.iter().map(find).collect()
 }
 
-fn tell(run: &RunSpec, verdicts: &[Verdict], ticks: u64, damage: Option<String>) -> String {
+fn tell(
+    run: &RunSpec,
+    schedule: &TickSchedule,
+    verdicts: &[Verdict],
+    ticks: u64,
+    damage: Option<String>,
+) -> String {
     let mut text = String::new();
     for Verdict { service, first, ticks: differing } in verdicts {
         let label = label_of(run, *service);
@@ -121,12 +146,24 @@ fn tell(run: &RunSpec, verdicts: &[Verdict], ticks: u64, damage: Option<String>)
             Some((tick, Finding::Fails(error))) => writeln!(text, "{label}: fails in tick {tick}: {error}"),
         };
     }
+    let differing = verdicts.iter().filter(|verdict| verdict.first.is_some());
+    if differing.clone().count() > 1
+        && let Some(cause) = differing.min_by_key(|verdict| verdict.rank(schedule))
+    {
+        let _ = writeln!(text, "the first of all: {}", label_of(run, cause.service));
+    }
     if let Some(damage) = damage {
         let _ = writeln!(text, "the log is cut or damaged after {ticks} of {} ticks: {damage}", run.ticks);
     } else if ticks < run.ticks {
         let _ = writeln!(text, "the log holds {ticks} of {} ticks", run.ticks);
     }
     text
+}
+
+impl From<TickError> for Failure {
+    fn from(error: TickError) -> Self {
+        Self::fault(error)
+    }
 }
 
 impl From<ConnectError> for Failure {

@@ -7,18 +7,22 @@ use mikoshi_ipc_types::{
 };
 use mikoshi_observation::{Observation, Observed};
 use mikoshi_runtime::{
-    Call, ConnectError, InMemoryHub, InMemoryTransport, Observer, Participant, Publisher, Tap, TickError,
+    Call, ConnectError, InMemoryHub, InMemoryTransport, Observer, Publisher, Replaceable, Tap, TickError,
     TickSchedule, Topic, Transport,
 };
+use std::collections::VecDeque;
 
 /// A service that is executed anew.
 pub struct Stage {
-    /// Which.
-    pub service: ServiceId,
-    participant: Box<dyn Participant>,
+    service: ServiceId,
+    hub: InMemoryHub,
+    participant: Box<dyn Replaceable>,
     calls: Vec<Call>,
     inputs: Vec<Input>,
     outputs: Vec<Output>,
+    /// The last ticks, as many as some input may be old.
+    recent: VecDeque<Observation>,
+    oldest_use: u64,
 }
 
 /// Hands a recorded frame to the service.
@@ -34,7 +38,7 @@ impl Stage {
     pub fn new<E: From<ConnectError>>(
         schedule: &TickSchedule,
         service: ServiceId,
-        build: impl FnOnce(&InMemoryTransport) -> Result<Box<dyn Participant>, E>,
+        build: impl FnOnce(&InMemoryTransport) -> Result<Box<dyn Replaceable>, E>,
     ) -> Result<Self, E> {
         // Of its own: of what others say it hears what was recorded.
         let hub = InMemoryHub::new(schedule.clone());
@@ -48,7 +52,42 @@ impl Stage {
             calls: phases().map(|phase| phase.call).collect(),
             inputs: inputs.map(|input| input_of(&hub, input.topic, input.from)).collect::<Result<_, _>>()?,
             outputs: outputs.map(|output| output_of(&hub, output.topic)).collect::<Result<_, _>>()?,
+            recent: VecDeque::new(),
+            oldest_use: phases()
+                .flat_map(|phase| &phase.inputs)
+                .map(|input| input.age_ticks)
+                .max()
+                .unwrap_or(0),
+            hub,
         })
+    }
+
+    /// Another process takes the service's place: `build` makes it, and it goes on from the old one's state.
+    ///
+    /// # Errors
+    /// It can't be made, or can't go on from that state.
+    pub fn replace<E: From<ConnectError> + From<TickError>>(
+        &mut self,
+        build: impl FnOnce(&InMemoryTransport) -> Result<Box<dyn Replaceable>, E>,
+    ) -> Result<(), E> {
+        let mut state = vec![0; self.participant.state_bytes()];
+        let length = self.participant.save(&mut state)?;
+        let mut successor = build(&self.hub.transport(self.service))?;
+        if successor.state_schema() != self.participant.state_schema() {
+            return Err(TickError::Checkpoint("the predecessor's state has another layout").into());
+        }
+        successor.load(&state[..length])?;
+        self.participant = successor;
+        // What its predecessor had heard already, and not yet used.
+        for recorded in core::mem::take(&mut self.recent) {
+            self.hear(&recorded)?;
+            self.recent.push_back(recorded);
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, recorded: &Observation) -> Result<(), TickError> {
+        self.inputs.iter_mut().try_for_each(|input| input(recorded))
     }
 
     /// Executes a tick on what was recorded of it; the first difference in what the service says, if any.
@@ -56,8 +95,12 @@ impl Stage {
     /// # Errors
     /// It could not execute the tick.
     pub fn execute(&mut self, recorded: &Observation) -> Result<Option<Difference>, TickError> {
-        for input in &mut self.inputs {
-            input(recorded)?;
+        self.hear(recorded)?;
+        if self.oldest_use > 0 {
+            self.recent.push_back(recorded.clone());
+            if self.recent.len() as u64 > self.oldest_use {
+                self.recent.pop_front();
+            }
         }
         for &call in &self.calls {
             self.participant.execute(call, recorded.tick())?;

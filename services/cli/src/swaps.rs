@@ -1,0 +1,125 @@
+//! Processes that are replaced on request, while they are in charge.
+
+use crate::children::{Children, Variant};
+use crate::control::{Client, Control, Request};
+use crate::observer::RunObserver;
+use crate::outcome::{label_of, robot_name, swap_of};
+use crate::revise::revise;
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_resolution::write_spec;
+use mikoshi_runtime::Board;
+use std::path::{Path, PathBuf};
+
+/// Requests of a run, and what has become of them so far.
+pub struct Swaps {
+    control: Control,
+    run_directory: PathBuf,
+    pending: Vec<Pending>,
+    /// Descriptions written so far.
+    specs: usize,
+}
+
+/// A successor on its way.
+struct Pending {
+    service: ServiceId,
+    /// Of its predecessor.
+    epoch: u64,
+    client: Client,
+    /// Its run, if it is another.
+    revised: Option<RunSpec>,
+}
+
+impl Swaps {
+    /// Of the run in this directory.
+    ///
+    /// # Errors
+    /// Nobody could ask.
+    pub fn listen(run_directory: &Path) -> std::io::Result<Self> {
+        let control = Control::listen(run_directory)?;
+        Ok(Self { control, run_directory: run_directory.to_owned(), pending: Vec::new(), specs: 0 })
+    }
+
+    /// Whether a successor of this service is on its way.
+    pub fn is_pending(&self, service: ServiceId) -> bool {
+        self.pending.iter().any(|pending| pending.service == service)
+    }
+
+    /// Takes requests, and sees to those that were taken.
+    pub fn look(
+        &mut self,
+        run: &RunSpec,
+        board: &Board,
+        children: &mut Children,
+        observer: &mut RunObserver,
+    ) {
+        if let Some((Request::Swap { service, set, program }, client)) = self.control.next() {
+            match self.begin(run, board, children, &service, &set, program) {
+                Ok((service, epoch, revised)) => {
+                    self.pending.push(Pending { service, epoch, client, revised });
+                }
+                Err(message) => client.refuse(message),
+            }
+        }
+        let mut index = 0;
+        while let Some(Pending { service, epoch, .. }) = self.pending.get(index) {
+            let (service, epoch) = (*service, *epoch);
+            let charge = board.charge_of(service).filter(|(current, _)| *current > epoch);
+            let has_ended = children.candidate(service).is_none_or(|process| process.ended.is_some());
+            match charge {
+                Some((_, since)) => {
+                    let Pending { client, revised, .. } = self.pending.swap_remove(index);
+                    children.promote(service);
+                    let swap = swap_of(run, service, since.tick + 1, "swap".to_owned());
+                    client.done(format!("{} replaced in tick {}", label_of(run, service), swap.tick));
+                    observer.note_revision(&swap, service, revised.as_ref());
+                    observer.note_swap(swap);
+                }
+                None if has_ended => {
+                    let words = children.candidate(service).map(|process| process.last_words());
+                    let label = label_of(run, service);
+                    let words = words.unwrap_or_default();
+                    let client = self.pending.swap_remove(index).client;
+                    client.refuse(format!("{label} stays: its successor has ended{words}"));
+                    children.dismiss(service);
+                }
+                None => index += 1,
+            }
+        }
+    }
+
+    fn begin(
+        &mut self,
+        run: &RunSpec,
+        board: &Board,
+        children: &mut Children,
+        name: &str,
+        set: &[(String, String)],
+        program: Option<PathBuf>,
+    ) -> Result<(ServiceId, u64, Option<RunSpec>), String> {
+        let services = || ServiceId::of_team(run.robots.len());
+        let name_of = |service| robot_name(run, service).map_or_else(|| service.to_string(), str::to_owned);
+        let service = services().find(|service| name_of(*service) == name).ok_or_else(|| {
+            let expected: Vec<_> = services().map(name_of).collect();
+            format!("there is no service {name:?}; expected one of {}", expected.join(", "))
+        })?;
+        if self.is_pending(service) {
+            return Err(format!("a successor of {name} is on its way already"));
+        }
+        let (epoch, _) = board.charge_of(service).ok_or("the board has no such service")?;
+        let mut variant = Variant { spec: None, program };
+        let revised = match set {
+            [] => None,
+            set => {
+                let revised = revise(run, set).map_err(|failure| failure.message)?;
+                self.specs += 1;
+                let path = self.run_directory.join(format!("run-{}.bin", self.specs));
+                write_spec(&path, &revised).map_err(|error| error.to_string())?;
+                variant.spec = Some(path);
+                Some(revised)
+            }
+        };
+        children.nominate(service, variant).map_err(|failure| failure.message)?;
+        Ok((service, epoch, revised))
+    }
+}
