@@ -1,5 +1,6 @@
 //! Sweeps: what each run draws, and what is refused before any runs.
 
+use mikoshi_config::sweep::Comparison;
 use mikoshi_config::{LoadedSweep, load_scenario, load_sweep};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -161,5 +162,125 @@ fn ranges_that_make_no_sense_are_refused() {
         "= 9",
         "= 11",
         "sweeps/lifts.toml:6: succeed_min: found 11, expected no more than all of the 10 runs",
+    );
+}
+
+const GRID: &str = r#"name = "lifts"
+description = "Lifts of two masses over three gains"
+scenario = "lift"
+runs = 2
+first_seed = 3
+succeed_min = 2
+[[grid]]
+key = "object.mass_kg"
+values = [1, 2.5]
+[[grid]]
+key = "hybrid.kz"
+values = [0.05, 0.1, 0.2]
+with.hybrid.loop_gain = [0.03, 0.02, 0.01]
+[[ranges]]
+key = "physics.friction"
+min = 0.4
+max = 1.0
+"#;
+
+/// The text for the sweep over a grid with `good` replaced by `bad`.
+#[track_caller]
+fn grid_gives(good: &str, bad: &str, expected: &str) {
+    assert_eq!(GRID.matches(good).count(), 1, "{good:?} is to be found once");
+    let (copy, path) = fixture(&GRID.replace(good, bad));
+    let Err(error) = load_sweep(&path) else { panic!("the input is bad") };
+    assert_eq!(error.to_string().replace(&format!("{}/", copy.path().display()), ""), expected);
+}
+
+#[test]
+fn a_grid_has_every_value_with_every_other_and_all_of_them_with_every_seed() {
+    let (_copy, path) = fixture(GRID);
+    let loaded = load_sweep(&path).unwrap();
+    assert_eq!(loaded.sweep.all_runs(), 12);
+    assert_eq!(
+        loaded.sweep.parameters().collect::<Vec<_>>(),
+        ["object.mass_kg", "hybrid.kz", "physics.friction"]
+    );
+    let runs = loaded.runs(12);
+    let places: Vec<_> =
+        runs.iter().map(|run| (run.seed, run.parameters[0].1, run.parameters[1].1)).collect();
+    let of_seed =
+        |seed| [1.0, 2.5].into_iter().flat_map(move |mass| [0.05, 0.1, 0.2].map(move |kz| (seed, mass, kz)));
+    assert_eq!(places, of_seed(3).chain(of_seed(4)).collect::<Vec<_>>());
+    assert_eq!(runs[0].parameters[2], runs[5].parameters[2], "what is drawn depends on the seed");
+    assert_ne!(runs[0].parameters[2], runs[6].parameters[2]);
+
+    let run = &runs[5];
+    let scenario = load_scenario(&loaded.scenario, &run.overrides, Some(run.seed)).unwrap().scenario;
+    assert_eq!((scenario.object.mass_kg, scenario.hybrid.kz), (2.5, 0.2));
+    assert_eq!(scenario.hybrid.loop_gain, 0.01, "it changes along");
+}
+
+#[test]
+fn every_value_of_a_grid_is_tried_before_anything_runs() {
+    grid_gives(
+        "2.5",
+        "-2.5",
+        "sweeps/lifts.toml:9: object.mass_kg: found -2.5, expected a finite number above 0",
+    );
+    grid_gives(
+        "0.1, 0.2]",
+        "0.1, 2]",
+        "sweeps/lifts.toml:12: hybrid.kz: found 2, expected a number above 0, up to 1",
+    );
+    grid_gives(
+        "0.02, 0.01]",
+        "0.02, -0.01]",
+        "sweeps/lifts.toml:13: hybrid.loop_gain: found -0.01, expected a finite number above 0",
+    );
+}
+
+#[test]
+fn grids_that_make_no_sense_are_refused() {
+    grid_gives(
+        "0.02, 0.01]",
+        "0.02]",
+        "sweeps/lifts.toml:13: grid.1.with.hybrid.loop_gain: found 2 values, expected an array with one for each \
+         of the 3 of \"hybrid.kz\"",
+    );
+    grid_gives("[1, 2.5]", "[]", "sweeps/lifts.toml:9: grid.0.values: found no value, expected at least one");
+    grid_gives(
+        "physics.friction",
+        "hybrid.loop_gain",
+        "sweeps/lifts.toml:15: ranges.0.key: found \"hybrid.loop_gain\" again, expected each name once",
+    );
+    grid_gives(
+        "object.mass_kg",
+        "seed",
+        "sweeps/lifts.toml:8: grid.0.key: found \"seed\", expected a key of numbers",
+    );
+    grid_gives(
+        "succeed_min = 2",
+        "succeed_min = 13",
+        "sweeps/lifts.toml:6: succeed_min: found 13, expected no more than all of the 12 runs",
+    );
+    grid_gives(
+        "runs = 2",
+        "runs = 50000",
+        "sweeps/lifts.toml:7: grid: found a grid of 6 points with 50000 runs each, expected at most 100000 runs",
+    );
+}
+
+#[test]
+fn a_comparison_is_one_of_those_there_are_and_has_its_numbers() {
+    let compared = |text: &str| GRID.replace("[[ranges]]", &format!("{text}\n[[ranges]]"));
+    let loaded = load(&compared("[comparison.time-to-edge]\nwithin = 0.2"));
+    assert_eq!(loaded.sweep.comparison, Some(Comparison::TimeToEdge { within: 0.2 }));
+    grid_gives(
+        "[[ranges]]",
+        "[comparison.time-to-egde]\nwithin = 0.2\n[[ranges]]",
+        "sweeps/lifts.toml:14: comparison: found \"time-to-egde\", expected one of \"time-to-edge\", \
+         \"follower-delay\"; did you mean \"time-to-edge\"?",
+    );
+    grid_gives(
+        "[[ranges]]",
+        "[comparison.follower-delay]\npaper_falls_s = 0\n[[ranges]]",
+        "sweeps/lifts.toml:15: comparison.follower-delay.paper_falls_s: found 0, expected a finite number above 0",
     );
 }

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// Length of the windows whose largest value counts.
 pub(crate) const WINDOW_S: f64 = 0.2;
 /// A zero moment point this near to the edge of the support is at the edge.
-const EDGE_M: f64 = 0.005;
+pub const EDGE_M: f64 = 0.005;
 /// A drift is not divided by less.
 const LEAST_WALK_M: f64 = 0.1;
 

@@ -9,25 +9,31 @@
 //! has a file that makes its scene of one run, or of two laid over each other; one renderer draws all
 //! scenes. What figures show is true; what control saw of it is at most a thin line.
 //!
-//! A sweep of many runs has a figure of its own: their figures over the parameters that they vary in.
+//! A sweep of many runs has a figure of its own, their figures over the parameters that they vary in, and
+//! another one where its runs are compared with what the paper predicts.
 //!
 //! This crate knows no log file, no simulator and no control.
 
 #![allow(non_snake_case)]
 
+mod comparison;
 mod error;
 mod figures;
+mod html;
 mod page;
 mod render;
 mod run_data;
 mod scene;
 mod style;
 mod sweep;
+mod sweep_page;
 #[cfg(test)]
 mod tests;
 mod write;
 
+pub use comparison::{ComparedRuns, EdgeTime, FollowerDelay, LateRobot, LateRun, TimeToEdge};
 pub use error::WriteReportError;
 pub use run_data::RunData;
-pub use sweep::{SweepFigure, SweepParameter, SweepQuantity, write_sweep_figure};
+pub use sweep::{SweepFigure, SweepParameter, SweepQuantity};
+pub use sweep_page::{SweepFailure, SweepReport, write_sweep};
 pub use write::{ReportedRun, write_report};

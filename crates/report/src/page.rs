@@ -1,12 +1,11 @@
 //! One HTML page with all of a report: it needs no other file.
 
 use crate::figures::LeftOut;
+use crate::html::{escaped, figure, page, table};
 use crate::scene::Figure;
 use crate::write::ReportedRun;
 use core::fmt::Write as _;
 use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
-
-const STYLE: &str = include_str!("page.css");
 
 /// The page. Every figure comes with its number and its SVG.
 pub fn html(runs: &[ReportedRun], figures: &[(u32, Figure, String)], left_out: &[LeftOut]) -> String {
@@ -14,35 +13,23 @@ pub fn html(runs: &[ReportedRun], figures: &[(u32, Figure, String)], left_out: &
         [run] => run.data.title(),
         runs => runs.iter().map(|run| run.label.as_str()).collect::<Vec<_>>().join(" and "),
     };
-    let title = escaped(&title);
-    let mut html = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\"/>\n<title>{title}</title>\n<style>\n{STYLE}</style>\n\
-         </head>\n<body>\n<h1>{title}</h1>\n<div class=\"runs\">\n"
-    );
+    let mut html = "<div class=\"runs\">\n".to_owned();
     for run in runs {
         html += &section(run, runs.len() > 1);
     }
     html += "</div>\n";
-    for (number, figure, svg) in figures {
-        // Writing to a string can't fail.
-        let _ = write!(
-            html,
-            "<figure id=\"figure-{number}\">\n{svg}<figcaption><b>Figure {number}.</b> {} \
-             <a href=\"figure-{number}.svg\">SVG</a> <a href=\"figure-{number}.png\">PNG</a></figcaption>\n\
-             </figure>\n",
-            escaped(&figure.caption)
-        );
+    for (number, drawn, svg) in figures {
+        html += &figure(&format!("figure-{number}"), &format!("Figure {number}."), &drawn.caption, svg);
     }
     if !left_out.is_empty() {
         html += "<h2>Figures left out</h2>\n<ul>\n";
         for LeftOut { number, reason } in left_out {
+            // Writing to a string can't fail.
             let _ = writeln!(html, "<li>Figure {number}: {}.</li>", escaped(reason));
         }
         html += "</ul>\n";
     }
-    html += "</body>\n</html>\n";
-    html
+    page(&title, &html)
 }
 
 fn section(run: &ReportedRun, is_one_of_two: bool) -> String {
@@ -204,22 +191,4 @@ fn robots_table(summary: &Summary) -> String {
     let mut html = table(&titles, summary.robots.iter().map(cells));
     html += "<p>ZMP and joint: smallest margins; torque: largest share of a limit; saturated: ticks.</p>\n";
     html
-}
-
-fn table(titles: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let line = |tag: &str, cells: &mut dyn Iterator<Item = &str>| {
-        let cells: String = cells.map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect();
-        format!("<tr>{cells}</tr>\n")
-    };
-    let mut html = "<table>\n".to_owned();
-    html += &line("th", &mut titles.iter().copied());
-    for row in rows {
-        html += &line("td", &mut row.iter().map(String::as_str));
-    }
-    html += "</table>\n";
-    html
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,12 +1,8 @@
 //! The figure of a sweep: what its runs came to over what they varied in.
 
-use crate::error::WriteReportError;
-use crate::render;
 use crate::scene::{Axis, Figure, LegendEntry, Mark, Panel, Stroke, range_of};
 use crate::style;
 use core::ops::Range;
-use std::fs;
-use std::path::Path;
 
 /// What a sweep's runs varied in and came to. All `values` are in the order of the runs.
 #[derive(Clone, Debug)]
@@ -48,22 +44,7 @@ const PANEL_HEIGHT_PX: u32 = 170;
 /// Runs that succeeded, and runs that failed.
 const COLOURS: [plotters::style::RGBColor; 2] = [style::PALETTE[0], style::PALETTE[1]];
 
-/// Writes `NAME.svg` and `NAME.png` into the folder `out`, which is there.
-///
-/// # Errors
-/// It can't be drawn; a file can't be written.
-pub fn write_sweep_figure(sweep: &SweepFigure, out: &Path, name: &str) -> Result<(), WriteReportError> {
-    let figure = figure(sweep);
-    let draw_error = |problem| WriteReportError::Draw { figure: name.to_owned(), problem };
-    let svg = render::svg(&figure).map_err(draw_error)?.into_bytes();
-    for (extension, bytes) in [("svg", svg), ("png", render::png(&figure).map_err(draw_error)?)] {
-        let path = out.join(name).with_extension(extension);
-        fs::write(&path, bytes).map_err(|source| WriteReportError::Io { path, source })?;
-    }
-    Ok(())
-}
-
-fn figure(sweep: &SweepFigure) -> Figure {
+pub(crate) fn figure(sweep: &SweepFigure) -> Figure {
     let ranges: Vec<_> = sweep.quantities.iter().map(|quantity| y_range(quantity, &sweep.failed)).collect();
     let panel = |parameter, quantity: usize| {
         panel(parameter, &sweep.quantities[quantity], ranges[quantity].clone(), &sweep.failed)
@@ -83,7 +64,7 @@ fn figure(sweep: &SweepFigure) -> Figure {
     Figure {
         title: sweep.title.clone(),
         subtitle: sweep.subtitle.clone(),
-        caption: String::new(),
+        caption: "Every run is a dot, or where it failed its number.".to_owned(),
         legend,
         columns: sweep.quantities.len(),
         panels,
@@ -140,10 +121,10 @@ fn limit_stroke() -> Stroke {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn sweep() -> SweepFigure {
+    pub(crate) fn sweep() -> SweepFigure {
         SweepFigure {
             title: "robust".to_owned(),
             subtitle: "4 runs".to_owned(),
@@ -196,14 +177,5 @@ mod tests {
     fn a_run_that_failed_leaves_the_others_room() {
         let figure = figure(&sweep());
         assert!(figure.panels[0].y.range.end < 20.0, "{:?}", figure.panels[0].y.range);
-    }
-
-    #[test]
-    fn a_sweep_is_drawn_as_svg_and_as_png() {
-        let out = tempfile::tempdir().expect("a folder");
-        write_sweep_figure(&sweep(), out.path(), "sweep").expect("it can be drawn");
-        let svg = fs::read_to_string(out.path().join("sweep.svg")).expect("it was written");
-        assert!(svg.contains("<circle") && svg.contains("friction"));
-        assert!(fs::read(out.path().join("sweep.png")).expect("it was written").starts_with(b"\x89PNG"));
     }
 }

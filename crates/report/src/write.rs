@@ -5,6 +5,7 @@ use crate::figures::{self, Runs};
 use crate::page;
 use crate::render;
 use crate::run_data::RunData;
+use crate::scene::Figure;
 use mikoshi_observation::Summary;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,20 +30,29 @@ pub struct ReportedRun {
 /// A figure that can't be drawn; a file that can't be written.
 pub fn write_report(runs: &[ReportedRun], out: &Path) -> Result<PathBuf, WriteReportError> {
     let (figures, left_out) = figures::all(&Runs(runs));
-    let io_error = |path: &Path, source| WriteReportError::Io { path: path.to_owned(), source };
-    fs::create_dir_all(out).map_err(|source| io_error(out, source))?;
-    let write = |name: &str, bytes: &[u8]| {
-        let path = out.join(name);
-        fs::write(&path, bytes).map_err(|source| io_error(&path, source)).map(|()| path)
-    };
+    fs::create_dir_all(out).map_err(|source| WriteReportError::Io { path: out.to_owned(), source })?;
     let mut drawn = Vec::with_capacity(figures.len());
     for (number, figure) in figures {
-        let name = format!("figure-{number}");
-        let draw_error = |problem| WriteReportError::Draw { figure: name.clone(), problem };
-        let svg = render::svg(&figure).map_err(draw_error)?;
-        write(&format!("{name}.svg"), svg.as_bytes())?;
-        write(&format!("{name}.png"), &render::png(&figure).map_err(draw_error)?)?;
+        let svg = write_figure(&figure, out, &format!("figure-{number}"))?;
         drawn.push((number, figure, svg));
     }
-    write("index.html", page::html(runs, &drawn, &left_out).as_bytes())
+    write_file(out, "index.html", page::html(runs, &drawn, &left_out).as_bytes())
+}
+
+/// Writes `NAME.svg` and `NAME.png` into the folder `out`, which is there; returns the SVG.
+pub(crate) fn write_figure(figure: &Figure, out: &Path, name: &str) -> Result<String, WriteReportError> {
+    let draw_error = |problem| WriteReportError::Draw { figure: name.to_owned(), problem };
+    let svg = render::svg(figure).map_err(draw_error)?;
+    write_file(out, &format!("{name}.svg"), svg.as_bytes())?;
+    write_file(out, &format!("{name}.png"), &render::png(figure).map_err(draw_error)?)?;
+    Ok(svg)
+}
+
+/// Writes a file into the folder `out`, which is there; returns its path.
+pub(crate) fn write_file(out: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, WriteReportError> {
+    let path = out.join(name);
+    match fs::write(&path, bytes) {
+        Ok(()) => Ok(path),
+        Err(source) => Err(WriteReportError::Io { path, source }),
+    }
 }

@@ -19,9 +19,11 @@ pub struct Pull {
     pub zmp_way_m: f64,
     /// Of its hands over the ground.
     pub hand_height_m: f64,
+    /// The motion's highest speed along the ground.
+    pub velocity_m_s: f64,
     /// The pull at which its zero moment point is at its toes.
     pub displacement_m: f64,
-    /// When that is, at the motion's highest speed along the ground.
+    /// When that is, at that speed.
     pub time_s: Option<f64>,
 }
 
@@ -64,6 +66,7 @@ fn pull(run: &RunSpec, spec: &RobotSpec) -> Result<Pull, Failure> {
         stiffness_n_m: pulled.stiffness_n_m,
         zmp_way_m: pulled.zmp_way_m,
         hand_height_m: pulled.hand_height_m,
+        velocity_m_s: fastest_m_s,
         displacement_m: pulled.displacement_to_edge_m(),
         time_s: motion.map(|motion| pulled.time_to_edge_s(fastest_m_s, motion.acceleration_m_s2)),
     })

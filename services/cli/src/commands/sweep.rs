@@ -5,13 +5,14 @@ use crate::failure::{Failure, Status};
 use crate::interrupts::Interrupts;
 use crate::output_directory::OutputDirectory;
 use crate::print::print_out;
-use crate::sweep::figure::figure;
+use crate::sweep::comparison::compare;
 use crate::sweep::jobs::Jobs;
+use crate::sweep::page;
 use crate::sweep::result::SweepResult;
 use crate::sweep::run_folder::RunFolder;
 use crate::sweep::text;
 use mikoshi_config::load_sweep;
-use mikoshi_report::write_sweep_figure;
+use mikoshi_report::write_sweep;
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -28,7 +29,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<Status, Failure> {
     let sweep = &loaded.sweep;
     let default = || Path::new("runs").join(format!("sweep-{}", sweep.name));
     let out = OutputDirectory::open(&arguments.out.clone().unwrap_or_else(default), false)?;
-    let runs = loaded.runs(arguments.runs.map_or(sweep.runs, |runs| runs.get().into()));
+    let runs = loaded.runs(arguments.runs.map_or(sweep.all_runs(), |runs| runs.get().into()));
     let folders = runs
         .iter()
         .map(|run| RunFolder::of(run, &loaded.scenario, out.path(), arguments.keep_logs))
@@ -38,12 +39,13 @@ pub fn sweep(arguments: &SweepArguments) -> Result<Status, Failure> {
     Jobs::new(jobs, &interrupts)?.perform(&folders, !arguments.quiet)?;
 
     let rows = runs.iter().zip(&folders).map(|(run, folder)| folder.row(run)).collect::<Result<_, _>>()?;
-    let result = SweepResult::of(sweep, rows);
+    let comparison = sweep.comparison.as_ref().map(|comparison| compare(comparison, &folders)).transpose()?;
+    let result = SweepResult::of(sweep, rows, comparison);
     let json = serde_json::to_string_pretty(&result).map_err(Failure::fault)? + "\n";
     write(&out.path().join("sweep.json"), json.as_bytes())?;
     if let Some(first) = folders.first() {
-        let figure = figure(&result, first.thresholds());
-        write_sweep_figure(&figure, out.path(), "sweep").map_err(Failure::fault)?;
+        let report = page::report(sweep, &result, first.thresholds());
+        write_sweep(&report, out.path()).map_err(Failure::fault)?;
     }
     if arguments.json {
         print_out(&json);

@@ -5,7 +5,7 @@ use mikoshi_config::scenario::Thresholds;
 use mikoshi_report::{SweepFigure, SweepParameter, SweepQuantity};
 
 /// Units that end keys, as axes show them.
-const UNITS: [(&str, &str); 13] = [
+const UNITS: [(&str, &str); 14] = [
     ("_m_s2", "m/s²"),
     ("_rad_s", "rad/s"),
     ("_n_m", "N/m"),
@@ -19,9 +19,10 @@ const UNITS: [(&str, &str); 13] = [
     ("_hz", "Hz"),
     ("_m", "m"),
     ("_n", "N"),
+    ("_s", "s"),
 ];
 
-/// Position peak, ZMP margin and peak internal force over every parameter that was drawn, or over the seed.
+/// Position peak, ZMP margin and peak internal force over every parameter that varies, or over the seed.
 pub fn figure(result: &SweepResult, limits: &Thresholds) -> SweepFigure {
     let rows = &result.runs;
     let drawn = result.parameters.iter().map(|key| SweepParameter {
@@ -53,9 +54,13 @@ pub fn figure(result: &SweepResult, limits: &Thresholds) -> SweepFigure {
 
 /// `sensors.force_noise_n` as `sensors force noise [N]`.
 fn label(key: &str) -> String {
+    // An array's element has its array's unit.
+    let is_index = |last: &str| last.bytes().all(|byte| byte.is_ascii_digit());
+    let element = key.rsplit_once('.').filter(|(_, last)| is_index(last));
+    let (key, index) = element.map_or((key, String::new()), |(array, last)| (array, format!(" {last}")));
     let unit = UNITS.into_iter().find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, unit)));
     let (name, unit) = unit.map_or((key, String::new()), |(name, unit)| (name, format!(" [{unit}]")));
-    name.replace(['.', '_'], " ") + &unit
+    name.replace(['.', '_'], " ") + &index + &unit
 }
 
 #[cfg(test)]
@@ -71,6 +76,8 @@ mod tests {
             ("sensors.force_noise_n", "sensors force noise [N]"),
             ("grasp.offset_m", "grasp offset [m]"),
             ("physics.friction", "physics friction"),
+            ("coordination.delay_s", "coordination delay [s]"),
+            ("motion.segments.0.velocity_m_s.1", "motion segments 0 velocity 1 [m/s]"),
         ] {
             assert_eq!(label(key), expected);
         }

@@ -1,7 +1,9 @@
 //! The parts of a sweep: its runs as processes, their folders, and what they come to together.
 
+pub(crate) mod comparison;
 pub(crate) mod figure;
 pub(crate) mod jobs;
+pub(crate) mod page;
 pub(crate) mod result;
 pub(crate) mod run_folder;
 pub(crate) mod text;

@@ -2,6 +2,7 @@
 //! SI units.
 
 use mikoshi_config::Sweep;
+use mikoshi_report::ComparedRuns;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -15,10 +16,14 @@ pub struct SweepResult {
     pub succeeded: u64,
     /// Of as many runs as there are: a sweep that is cut short needs its share.
     pub succeed_min: u64,
-    /// Keys that were drawn, in the order of the file.
+    /// Keys by which runs differ: those of the grid, then those that were drawn.
     pub parameters: Vec<String>,
     pub median: Figures,
     pub worst: Figures,
+    /// The runs beside what the paper predicts of them, where the sweep asks for it.
+    pub comparison: Option<ComparedRuns>,
+    /// Where they agree, and where not.
+    pub findings: Vec<String>,
     pub runs: Vec<Row>,
 }
 
@@ -52,18 +57,20 @@ pub struct Figures {
 
 impl SweepResult {
     /// Of these runs.
-    pub fn of(sweep: &Sweep, runs: Vec<Row>) -> Self {
+    pub fn of(sweep: &Sweep, runs: Vec<Row>, comparison: Option<ComparedRuns>) -> Self {
         let succeeded = runs.iter().filter(|row| row.passed).count() as u64;
-        let succeed_min = share(sweep.succeed_min, runs.len() as u64, sweep.runs);
+        let succeed_min = share(sweep.succeed_min, runs.len() as u64, sweep.all_runs());
         Self {
             sweep: sweep.name.clone(),
             scenario: sweep.scenario.clone(),
-            passed: succeeded >= succeed_min,
+            passed: succeeded >= succeed_min && comparison.as_ref().is_none_or(ComparedRuns::is_met),
             succeeded,
             succeed_min,
-            parameters: sweep.ranges.iter().map(|range| range.key.clone()).collect(),
+            parameters: sweep.parameters().map(str::to_owned).collect(),
             median: Figures::over(&runs, median, median),
             worst: Figures::over(&runs, largest, smallest),
+            findings: comparison.as_ref().map_or_else(Vec::new, ComparedRuns::findings),
+            comparison,
             runs,
         }
     }

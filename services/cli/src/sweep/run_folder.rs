@@ -54,6 +54,11 @@ impl RunFolder {
         command
     }
 
+    /// The scenario with all that lies over it.
+    pub fn loaded(&self) -> &LoadedScenario {
+        &self.scenario
+    }
+
     /// By what the run is judged.
     pub fn thresholds(&self) -> &Thresholds {
         &self.scenario.scenario.thresholds
@@ -148,7 +153,11 @@ impl RunFolder {
         })
     }
 
-    fn summary(&self) -> Result<Value, Failure> {
+    /// The summary of a finished run.
+    ///
+    /// # Errors
+    /// It can't be read.
+    pub fn summary(&self) -> Result<Value, Failure> {
         let path = self.path.join("summary.json");
         let text = fs::read(&path).map_err(|error| Failure::fault(error).context(path.display()))?;
         serde_json::from_slice(&text).map_err(|error| Failure::fault(error).context(path.display()))

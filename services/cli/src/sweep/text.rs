@@ -22,22 +22,36 @@ pub fn report(result: &SweepResult, out: &Path) -> String {
     for row in failed {
         text += &failure(result, row);
     }
-    // Writing to a string can't fail.
+    if !result.findings.is_empty() {
+        text += "\nBeside the paper\n";
+    }
+    for finding in &result.findings {
+        // Writing to a string can't fail.
+        let _ = writeln!(text, "  {finding}");
+    }
     let _ = writeln!(text, "\nresults in {}", out.display());
-    let _ = writeln!(
-        text,
-        "{}: {} of {} runs of {} succeeded, expected at least {}",
+    let _ = writeln!(text, "{}", verdict(result));
+    text
+}
+
+/// Whether it passed, and why, in one line.
+pub fn verdict(result: &SweepResult) -> String {
+    let compared = match &result.comparison {
+        Some(comparison) if !comparison.is_met() => "; they do not agree with the paper as they are to",
+        _ => "",
+    };
+    format!(
+        "{}: {} of {} runs of {} succeeded, expected at least {}{compared}",
         if result.passed { "passed" } else { "NOT passed" },
         result.succeeded,
         result.runs.len(),
         result.scenario,
         result.succeed_min
-    );
-    text
+    )
 }
 
-/// What is printed of all figures.
-fn figures(figures: &Figures) -> [(&'static str, f64); 8] {
+/// What is told of all figures.
+pub fn figures(figures: &Figures) -> [(&'static str, f64); 8] {
     [
         ("position peak mm", 1e3 * figures.position_peak_m),
         ("position RMS mm", 1e3 * figures.position_rms_m),
@@ -56,18 +70,32 @@ fn failure(result: &SweepResult, row: &Row) -> String {
     for cause in &row.failures {
         let _ = writeln!(text, "    {cause}");
     }
-    let drawn = result.parameters.iter().filter_map(|key| {
-        // The last part of a key tells enough, and three digits.
-        let name = key.rsplit('.').next().unwrap_or(key);
-        row.parameters.get(key).map(|value| format!("{name} {}", three_digits(*value)))
-    });
-    let drawn: Vec<_> = drawn.collect();
-    if !drawn.is_empty() {
-        let _ = writeln!(text, "    with {}", drawn.join(", "));
+    let parameters = parameters(result, row);
+    if !parameters.is_empty() {
+        let _ = writeln!(text, "    with {parameters}");
     }
     text
 }
 
+/// What tells a run from others: `mass_kg 5.43, friction 0.7`.
+pub fn parameters(result: &SweepResult, row: &Row) -> String {
+    let drawn = result.parameters.iter().filter_map(|key| {
+        let name = short_name(key);
+        row.parameters.get(key).map(|value| format!("{name} {}", three_digits(*value)))
+    });
+    let drawn: Vec<_> = drawn.collect();
+    drawn.join(", ")
+}
+
+/// The last part of a key tells enough; of an array's element, with the array's name.
+fn short_name(key: &str) -> &str {
+    let is_index = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
+    let array = key.rsplit_once('.').filter(|(_, last)| is_index(last)).map_or(key, |(array, _)| array);
+    let start = array.rfind('.').map_or(0, |dot| dot + 1);
+    key.get(start..).unwrap_or(key)
+}
+
+/// Three digits tell enough.
 fn three_digits(value: f64) -> String {
     let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     let text = format!("{value:.*}", (2.0 - digits).clamp(0.0, 12.0) as usize);
@@ -80,6 +108,12 @@ fn three_digits(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_are_told_by_their_last_part_and_elements_by_their_arrays() {
+        let names = ["object.mass_kg", "seed", "motion.segments.0.velocity_m_s.1"].map(short_name);
+        assert_eq!(names, ["mass_kg", "seed", "velocity_m_s.1"]);
+    }
 
     #[test]
     fn numbers_are_told_by_three_digits() {
