@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// What the folders of scenarios and sweeps are called, in which some of them may have a folder of their own.
+const FOLDERS_OF_FILES: [&str; 2] = ["scenarios", "sweeps"];
+
 /// A scenario with the robots that it names, and the places where every key was written.
 #[derive(Clone, Debug)]
 pub struct LoadedScenario {
@@ -186,13 +189,20 @@ pub(crate) fn robots_beside(scenario: &Path) -> PathBuf {
     scenario.with_extension("robots")
 }
 
-/// The folder `name` beside the scenario's folder.
-pub(crate) fn sibling(scenario: &Path, name: &str) -> PathBuf {
-    let folder = scenario.parent().unwrap_or(Path::new(""));
-    match folder.file_name() {
-        Some(_) => folder.with_file_name(name),
-        None => folder.join("..").join(name),
-    }
+/// The folder `name` beside the one that holds scenarios, or sweeps: the file's own folder, unless the one
+/// above is called so.
+pub(crate) fn sibling(file: &Path, name: &str) -> PathBuf {
+    let above = |folder: &Path| match folder.file_name() {
+        Some(_) => folder.parent().unwrap_or(Path::new("")).to_owned(),
+        None => folder.join(".."),
+    };
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let outer = above(folder);
+    // By its true name: from within, it may have been typed as `..`.
+    let real = if outer.as_os_str().is_empty() { Path::new(".") } else { &outer };
+    let is_of_files = std::fs::canonicalize(real)
+        .is_ok_and(|real| real.file_name().is_some_and(|name| FOLDERS_OF_FILES.iter().any(|of| name == *of)));
+    above(if is_of_files { &outer } else { folder }).join(name)
 }
 
 /// `DIR/NAME.toml`, or what is wrong with the name.

@@ -11,7 +11,10 @@ fn folder(name: &str) -> PathBuf {
 
 fn names_in(name: &str) -> Vec<String> {
     let files = fs::read_dir(folder(name)).unwrap().map(|entry| entry.unwrap().path());
-    files.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect()
+    files
+        .filter(|path| path.is_file())
+        .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect()
 }
 
 fn load(name: &str, overrides: &[(&str, &str)]) -> LoadedScenario {
@@ -39,6 +42,28 @@ fn palms(loaded: &LoadedScenario) -> Vec<[f64; 3]> {
 fn every_scenario_is_called_as_its_file() {
     for name in names_in("scenarios") {
         assert_eq!(load(&name, &[]).scenario.name, name);
+    }
+}
+
+#[test]
+fn teams_of_all_sizes_have_a_scenario_that_carries_for_twenty_seconds() {
+    for (file, robots) in [("2", 2), ("3", 3), ("5", 5), ("8", 8)] {
+        let scenario = load(&format!("teams/{file}"), &[]).scenario;
+        assert_eq!(
+            (scenario.name.as_str(), scenario.robots.len()),
+            (format!("team_{file}").as_str(), robots)
+        );
+        let random = scenario.motion.expect("it moves").random.expect("by seed");
+        assert_eq!(random.duration_s, 20.0);
+    }
+}
+
+/// As people type them who are in a folder of scenarios, or in one within.
+#[test]
+fn a_scenario_finds_its_team_from_wherever_it_is_typed() {
+    let scenarios = folder("scenarios");
+    for path in ["teams/8.toml", "teams/../hold.toml", "./hold.toml", "../scenarios/teams/2.toml"] {
+        load_scenario(&scenarios.join(path), &[], None).unwrap_or_else(|error| panic!("{path}: {error}"));
     }
 }
 
