@@ -11,8 +11,6 @@ use std::collections::BTreeMap;
 
 /// Length of the windows whose largest value counts.
 pub(crate) const WINDOW_S: f64 = 0.2;
-/// A zero moment point this near to the edge of the support is at the edge.
-pub const EDGE_M: f64 = 0.005;
 /// A drift is not divided by less.
 const LEAST_WALK_M: f64 = 0.1;
 
@@ -84,6 +82,9 @@ pub struct JudgedFigures {
 }
 
 impl Figures {
+    /// A zero moment point this near to the edge of the support is at the edge \[m\].
+    pub const EDGE_M: f64 = 0.005;
+
     /// Nothing observed yet.
     pub fn new(run: ObservedRun) -> Self {
         let robots = run.robots.iter().map(RobotFigures::new).collect();
@@ -292,7 +293,7 @@ impl RobotFigures {
     }
 
     fn note_edge(&mut self, tick: u64, truth: &RobotTruth) {
-        if truth.zmp_margin_m < EDGE_M {
+        if truth.zmp_margin_m < Figures::EDGE_M {
             self.edge_tick.get_or_insert(tick);
         }
     }

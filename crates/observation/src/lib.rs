@@ -14,7 +14,7 @@ mod tap;
 mod truth;
 
 pub use canonical::{LogHash, Observation, Observed, PayloadRef};
-pub use figures::{EDGE_M, Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
+pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{Fault, InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};

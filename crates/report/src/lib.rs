@@ -36,4 +36,4 @@ pub use error::WriteReportError;
 pub use run_data::RunData;
 pub use sweep::{SweepFigure, SweepParameter, SweepQuantity};
 pub use sweep_page::{SweepFailure, SweepReport, write_sweep};
-pub use write::{ReportedRun, write_report};
+pub use write::{JudgedLimit, ReportedRun, write_report};

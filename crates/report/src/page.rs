@@ -3,7 +3,7 @@
 use crate::figures::LeftOut;
 use crate::html::{escaped, figure, page, table};
 use crate::scene::Figure;
-use crate::write::ReportedRun;
+use crate::write::{JudgedLimit, ReportedRun};
 use core::fmt::Write as _;
 use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
 
@@ -48,23 +48,28 @@ fn section(run: &ReportedRun, is_one_of_two: bool) -> String {
         );
     }
     html += &facts(summary);
-    let limits = match run.data.thresholds.as_slice() {
-        [] => "<p>The scenario sets none.</p>\n".to_owned(),
-        limits => {
-            table(&["threshold", "limit"], limits.iter().map(|(key, limit)| vec![key.clone(), limit.clone()]))
-        }
-    };
     html += "<div class=\"tables\">\n";
     for (title, content) in [
         ("Internal forces", internal_table(&summary.internal)),
         ("Object against its reference", object_table(&summary.object)),
         ("Robots", robots_table(summary)),
-        ("Thresholds", limits),
+        ("Thresholds", limits_table(&run.limits)),
     ] {
         let _ = write!(html, "<div>\n<h3>{title}</h3>\n{content}</div>\n");
     }
     html += "</div>\n</section>\n";
     html
+}
+
+fn limits_table(limits: &[JudgedLimit]) -> String {
+    if limits.is_empty() {
+        return "<p>The scenario sets none.</p>\n".to_owned();
+    }
+    let cells = |limit: &JudgedLimit| {
+        let measured = if limit.is_met { limit.measured.clone() } else { format!("{} ✗", limit.measured) };
+        vec![limit.what.clone(), measured, limit.limit.clone()]
+    };
+    table(&["threshold", "measured", "asked for"], limits.iter().map(cells))
 }
 
 fn verdict(summary: &Summary) -> String {

@@ -22,8 +22,6 @@ pub struct RunData {
     /// Each internal force.
     pub(crate) internal: Vec<InternalCourse>,
     pub(crate) robots: Vec<RobotCourse>,
-    /// Thresholds of the scenario, as it names them.
-    pub(crate) thresholds: Vec<(String, String)>,
     tracker: ObjectTracker,
 }
 
@@ -114,7 +112,6 @@ impl RunData {
             object: ObjectCourse { size_m: scenario.object.size_m, ..ObjectCourse::default() },
             internal: internal.collect(),
             robots: robots.collect(),
-            thresholds: thresholds(run),
             tracker: ObjectTracker::new(observed),
         }
     }
@@ -214,17 +211,5 @@ impl ObjectCourse {
             (p_W.x, p_W.y)
         };
         [(x, y), (-x, y), (-x, -y), (x, -y)].map(corner).to_vec()
-    }
-}
-
-/// The thresholds that a scenario sets, in its own words.
-fn thresholds(run: &RunSpec) -> Vec<(String, String)> {
-    match serde_json::to_value(&run.scenario.thresholds) {
-        Ok(serde_json::Value::Object(keys)) => keys
-            .into_iter()
-            .filter(|(_, value)| !value.is_null())
-            .map(|(key, value)| (key, value.to_string()))
-            .collect(),
-        _ => vec![],
     }
 }

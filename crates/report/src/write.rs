@@ -19,8 +19,23 @@ pub struct ReportedRun {
     pub summary: Summary,
     /// Its course.
     pub data: RunData,
+    /// What it was judged by.
+    pub limits: Vec<JudgedLimit>,
     /// Why the course ends before the run does, if its log is cut.
     pub damage: Option<String>,
+}
+
+/// A threshold of a run's scenario, and what was measured. In words, with units.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JudgedLimit {
+    /// What was judged.
+    pub what: String,
+    /// What it came to.
+    pub measured: String,
+    /// What was asked for.
+    pub limit: String,
+    /// Whether it is met.
+    pub is_met: bool,
 }
 
 /// Writes every figure that one run, or two laid over each other, have data for, and a page with them;

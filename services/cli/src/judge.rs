@@ -5,6 +5,7 @@ use mikoshi_config::scenario::{AxisControl, Control, Thresholds};
 use mikoshi_cooperation::OBJECT_ROW;
 use mikoshi_ipc_types::mode;
 use mikoshi_observation::{InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary};
+use mikoshi_report::JudgedLimit;
 
 const GRAVITY_M_S2: f64 = 9.81;
 /// How long after its start the hybrid law is judged.
@@ -12,6 +13,15 @@ const JUDGED_AFTER_S: f64 = 3.0;
 
 /// Every threshold that was not met, in words. Nothing that was not observed counts as met.
 pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
+    judge(scenario, summary).failures
+}
+
+/// Every threshold with what was measured.
+pub fn judged_limits(scenario: &Scenario, summary: &Summary) -> Vec<JudgedLimit> {
+    judge(scenario, summary).limits
+}
+
+fn judge(scenario: &Scenario, summary: &Summary) -> Judge {
     let limits = &scenario.thresholds;
     let mut judge = Judge::default();
     for robot in &summary.fell {
@@ -23,7 +33,9 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
 
     if let Some(limit) = limits.internal_start_min_n {
         let largest = largest(&summary.internal, |row| row.start_n);
-        if largest < limit {
+        let is_met = largest >= limit;
+        judge.note("internal forces at the start", largest, format!("at least {limit} N"), "N", is_met);
+        if !is_met {
             judge.fail(format!(
                 "internal forces start at no more than {largest:.3} N, expected at least {limit} N"
             ));
@@ -48,7 +60,7 @@ pub fn failures(scenario: &Scenario, summary: &Summary) -> Vec<String> {
     for robot in &summary.robots {
         judge_robot(&mut judge, scenario, robot, summary.ticks);
     }
-    judge.failures
+    judge
 }
 
 fn judge_object(judge: &mut Judge, scenario: &Scenario, object: &ObjectSummary) {
@@ -130,13 +142,12 @@ fn judge_axis(
         // The external moment has no figure: NaN fails.
         None => external_force_n.get(component).copied().unwrap_or(f64::NAN),
     };
-    if end.is_nan() || (end - reference).abs() > limit {
-        judge.fail(format!(
-            "{} of {}: {} at the end, expected {reference} {unit} within {limit} {unit}",
-            format!("{:?}", axis.axis).to_lowercase(),
-            axis.row,
-            quantity(end, unit),
-        ));
+    let is_met = (end - reference).abs() <= limit;
+    let what = format!("{} of {}", format!("{:?}", axis.axis).to_lowercase(), axis.row);
+    let expected = format!("{reference} {unit} within {limit} {unit}");
+    judge.note(format_args!("{what} at the end"), end, &expected, unit, is_met);
+    if !is_met {
+        judge.fail(format!("{what}: {} at the end, expected {expected}", quantity(end, unit)));
     }
 }
 
@@ -185,11 +196,13 @@ fn judge_robot(judge: &mut Judge, scenario: &Scenario, robot: &RobotSummary, tic
     if let Some(limit) = limits.zmp_margin_min_m {
         judge.at_least(format_args!("ZMP margin of {name}"), robot.zmp_margin_min_m, limit, "m");
     }
-    if let Some(limit) = limits.saturated_ticks_max
-        && robot.saturated_ticks > limit
-    {
+    if let Some(limit) = limits.saturated_ticks_max {
         let ticks = robot.saturated_ticks;
-        judge.fail(format!("drives of {name} saturated: {ticks} ticks, expected at most {limit}"));
+        let what = format!("ticks with saturated drives of {name}");
+        judge.note(what, ticks as f64, format!("at most {limit}"), "", ticks <= limit);
+        if ticks > limit {
+            judge.fail(format!("drives of {name} saturated: {ticks} ticks, expected at most {limit}"));
+        }
     }
     if let Some(limit) = limits.saturated_share_max {
         let share = robot.saturated_ticks as f64 / ticks.max(1) as f64;
@@ -204,11 +217,26 @@ fn largest(rows: &[InternalSummary], figure: impl Fn(&InternalSummary) -> f64) -
 #[derive(Default)]
 struct Judge {
     failures: Vec<String>,
+    limits: Vec<JudgedLimit>,
 }
 
 impl Judge {
     fn fail(&mut self, what: String) {
         self.failures.push(what);
+    }
+
+    fn note(
+        &mut self,
+        what: impl core::fmt::Display,
+        measured: f64,
+        limit: impl core::fmt::Display,
+        unit: &str,
+        is_met: bool,
+    ) {
+        let measured = if measured == 0.0 { format!("0 {unit}") } else { quantity(measured, unit) };
+        let measured = measured.trim_end().to_owned();
+        let limit = limit.to_string().trim_end().to_owned();
+        self.limits.push(JudgedLimit { what: what.to_string(), measured, limit, is_met });
     }
 
     /// One failure for all rows: the largest, and how many there are. Rows that were not observed fail.
@@ -221,12 +249,16 @@ impl Judge {
         figure: impl Fn(&InternalSummary) -> f64,
     ) {
         let Some(limit) = limit else { return };
+        let expected = format!("at most {limit} {unit}");
         let Some(rows) = observed else {
+            self.note(format_args!("internal forces {when}"), f64::NAN, expected, unit, false);
             return self.fail(format!(
                 "internal forces {when}: the run ends before, expected at most {limit} {unit}"
             ));
         };
         // NaN fails, and is the largest.
+        let worst = rows.iter().map(&figure).max_by(f64::total_cmp).unwrap_or(0.0);
+        self.note(format_args!("internal forces {when}"), worst, expected, unit, worst <= limit);
         let failed = || rows.iter().filter(|row| figure(row).is_nan() || figure(row) > limit);
         if let Some(largest) = failed().max_by(|a, b| figure(a).total_cmp(&figure(b))) {
             self.fail(format!(
@@ -240,12 +272,14 @@ impl Judge {
     }
 
     fn at_most(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
+        self.note(&what, value, format_args!("at most {limit} {unit}"), unit, value <= limit);
         if value.is_nan() || value > limit {
             self.fail(format!("{what}: {}, expected at most {limit} {unit}", quantity(value, unit)));
         }
     }
 
     fn at_least(&mut self, what: impl core::fmt::Display, value: f64, limit: f64, unit: &str) {
+        self.note(&what, value, format_args!("at least {limit} {unit}"), unit, value >= limit);
         if value.is_nan() || value < limit {
             self.fail(format!("{what}: {}, expected at least {limit} {unit}", quantity(value, unit)));
         }
@@ -311,6 +345,37 @@ mod tests {
         let mut judge = Judge::default();
         judge_axis(&mut judge, &limits, &yaw, &rows, &external);
         assert_eq!(judge.failures.len(), 1);
+    }
+
+    #[test]
+    fn every_limit_that_is_set_is_told_with_what_was_measured() {
+        let limits = |limits: &[JudgedLimit]| -> Vec<String> {
+            let told = |limit: &JudgedLimit| {
+                format!("{}: {}, {} ({})", limit.what, limit.measured, limit.limit, limit.is_met)
+            };
+            limits.iter().map(told).collect()
+        };
+        let mut judge = Judge::default();
+        judge.at_most("share", 0.02, 0.001, "");
+        judge.at_most("error", 0.003, 0.008, "m");
+        judge.at_least("ZMP margin of A", 0.0412, 0.025, "m");
+        judge.at_most("way", f64::NAN, 1.0, "m");
+        let row = InternalSummary { name: "L|R".into(), peak_n: 16.7, ..InternalSummary::default() };
+        judge.internal_forces(Some(&[row]), "from 3 s on", "N", Some(20.0), |row| row.peak_n);
+        judge.internal_forces(None, "at the end", "N", Some(0.3), |row| row.end_n);
+        judge.internal_forces(None, "at the end", "Nm", None, |row| row.end_nm);
+        assert_eq!(
+            limits(&judge.limits),
+            [
+                "share: 0.02000, at most 0.001 (false)",
+                "error: 0.003000 m, at most 0.008 m (true)",
+                "ZMP margin of A: 0.04120 m, at least 0.025 m (true)",
+                "way: NaN m, at most 1 m (false)",
+                "internal forces from 3 s on: 16.70 N, at most 20 N (true)",
+                "internal forces at the end: NaN N, at most 0.3 N (false)",
+            ]
+        );
+        assert_eq!(judge.failures.len(), 3, "a limit is not met where there is a failure, and nowhere else");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::scene::{Axis, Figure, LegendEntry, Mark, Panel, Stroke, range_of};
 use crate::style;
-use mikoshi_observation::EDGE_M;
+use mikoshi_observation::Figures;
 use plotters::style::RGBColor;
 use serde::Serialize;
 
@@ -138,7 +138,7 @@ impl FollowerDelay {
              feet that bear; no dot where a robot left the ground. Middle: when it first was within {:.0} mm of it, from the start of the motion on; no \
              dot where it never was. Below: largest tilt of the base, with falls by name.",
             self.velocity_m_s,
-            1e3 * EDGE_M
+            1e3 * Figures::EDGE_M
         );
         let margins = self.panel(&runs, "smallest ZMP margin [mm]", Some(0.0), LEAST_MM, |robot| {
             (robot.zmp_margin_min_m > LEFT_GROUND_M).then_some(1e3 * robot.zmp_margin_min_m)

@@ -3,7 +3,7 @@
 use super::runs;
 use crate::scene::{Axis, Figure, LegendEntry, Mark, Panel, Stroke};
 use crate::style;
-use mikoshi_observation::EDGE_M;
+use mikoshi_observation::Figures;
 use serde::Serialize;
 
 const PANEL_HEIGHT_PX: u32 = 560;
@@ -104,7 +104,7 @@ impl TimeToEdge {
              still is within {:.0} mm of the edge of its feet: measured, over what eq. 42 predicts with the \
              velocity's ramp, and their ratio over the stiffness between both robots. Below 1 the follower is \
              at its edge sooner than predicted.",
-            1e3 * EDGE_M
+            1e3 * Figures::EDGE_M
         );
         Figure {
             title: "Eq. 42: how long a standing follower can be pulled".to_owned(),

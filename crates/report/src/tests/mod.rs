@@ -230,6 +230,19 @@ fn two_runs_lie_over_each_other_and_the_second_is_dashed() {
     );
 }
 
+#[test]
+fn every_limit_stands_beside_what_was_measured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = write_report(&[run("a", STAND)], folder.path()).expect("there is room");
+    let html = fs::read_to_string(page).expect("it was written");
+    for row in [
+        "<tr><td>largest force</td><td>4.321 N</td><td>at most 5 N</td></tr>",
+        "<tr><td>last force</td><td>5.432 N ✗</td><td>at most 5 N</td></tr>",
+    ] {
+        assert!(html.contains(row), "no {row}");
+    }
+}
+
 /// The files of a report, by their names.
 fn files(folder: &Path) -> BTreeSet<String> {
     let names = fs::read_dir(folder).expect("it was written").map(|entry| entry.expect("a file").file_name());
@@ -258,7 +271,7 @@ fn a_report_is_a_page_and_two_files_for_each_figure() {
     let svgs = page.descendants().filter(|node| node.tag_name().name() == "svg").count();
     assert_eq!(svgs, figures.len(), "they are in the page itself");
     for text in
-        ["hold, seed 0", "Passed", "internal_end_n", "A.right|A.left", "Figure 18: no robot takes a step"]
+        ["hold, seed 0", "Passed", "largest force", "A.right|A.left", "Figure 18: no robot takes a step"]
     {
         assert!(html.contains(text), "no {text:?}");
     }

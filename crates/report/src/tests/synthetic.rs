@@ -1,7 +1,7 @@
 //! A run of two robots that no simulator made: object, forces and feet move as formulas say.
 
 use crate::run_data::RunData;
-use crate::write::ReportedRun;
+use crate::write::{JudgedLimit, ReportedRun};
 use core::f64::consts::PI;
 use mikoshi_config::{RunSpec, load_scenario};
 use mikoshi_ipc_types::mode;
@@ -56,7 +56,14 @@ pub fn run(label: &str, kind: Kind) -> ReportedRun {
         drift_between_robots_m: judged.drift_between_robots_m,
         ..Summary::default()
     };
-    ReportedRun { label: label.to_owned(), summary, data, damage: None }
+    let limit = |what: &str, measured: &str, is_met| JudgedLimit {
+        what: what.to_owned(),
+        measured: measured.to_owned(),
+        limit: "at most 5 N".to_owned(),
+        is_met,
+    };
+    let limits = vec![limit("largest force", "4.321 N", true), limit("last force", "5.432 N", false)];
+    ReportedRun { label: label.to_owned(), summary, data, limits, damage: None }
 }
 
 fn spec(kind: Kind) -> RunSpec {

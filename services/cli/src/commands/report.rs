@@ -2,6 +2,7 @@
 
 use crate::arguments::ReportArguments;
 use crate::failure::{Failure, as_lines};
+use crate::judge::judged_limits;
 use crate::observed_run::observed_run;
 use crate::output_directory::{REPORT, RUN_LOG, SUMMARY};
 use crate::print::{print_error, print_out};
@@ -64,7 +65,8 @@ fn read_run(folder: &Path) -> Result<ReportedRun, Failure> {
         let warning = format!("{}: cut or damaged, drawn up to there: {damage}", path.display());
         print_error(&as_lines("warning", &warning));
     }
-    Ok(ReportedRun { label: name_of(folder), summary, data, damage })
+    let limits = judged_limits(&log.run().scenario, &summary);
+    Ok(ReportedRun { label: name_of(folder), summary, data, limits, damage })
 }
 
 fn read_summary(path: &Path) -> Result<Summary, Failure> {
