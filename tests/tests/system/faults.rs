@@ -1,9 +1,11 @@
-//! Whatever dies, the run ends, says so, and leaves nothing behind. A run that hangs is a test that hangs.
+//! Whatever dies for good, the run ends, says so, and leaves nothing behind. A run that hangs is a test that
+//! hangs.
 
 use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::{Board, Role};
 use mikoshi_tests::run::{Results, Running, is_alive, left_behind, run};
 use mikoshi_tests::scenarios::{ENDLESS, SHORT, of_project};
-use rustix::process::Signal;
+use rustix::process::{Pid, Signal, kill_process};
 use std::path::PathBuf;
 use std::thread::yield_now;
 
@@ -11,9 +13,15 @@ fn start(results: &Results) -> Running {
     Running::start(&of_project("hold"), &ENDLESS, results)
 }
 
+/// A run in which nobody who dies is replaced.
+fn start_without_successors(results: &Results) -> Running {
+    let arguments = [&ENDLESS[..], &["--set", "supervision.restart_limit=0"]].concat();
+    Running::start(&of_project("hold"), &arguments, results)
+}
+
 fn kill_one(service: ServiceId, name: &str, kind: &str) {
     let results = Results::new();
-    let running = start(&results);
+    let running = start_without_successors(&results);
     let (directory, services) = (running.directory(), running.services());
     assert_eq!(services.len(), 6);
 
@@ -47,7 +55,7 @@ fn a_servo_that_is_killed_ends_the_run() {
 
 fn freeze_one(service: ServiceId, name: &str, kind: &str) {
     let results = Results::new();
-    let running = start(&results);
+    let running = start_without_successors(&results);
     let (directory, services) = (running.directory(), running.services());
     running.signal_service(service, Signal::STOP);
     let said = running.wait();
@@ -75,6 +83,32 @@ fn a_coordinator_that_is_frozen_ends_the_run() {
 fn a_servo_that_is_frozen_ends_the_run() {
     freeze_one(ServiceId::Servo(2), "servo of robot C", "servo");
 }
+
+#[test]
+fn a_service_that_dies_again_and_again_is_given_up() {
+    let results = Results::new();
+    let running = start(&results);
+    let directory = running.directory();
+    // Its successors can't get on: they wait for the bridge.
+    running.signal_service(ServiceId::Bridge, Signal::STOP);
+    let mut last = None;
+    loop {
+        let Ok(board) = Board::open(&directory) else { break };
+        let owner = board.statuses().into_iter().find(|status| status.role == Role::Service(VICTIM));
+        let Some(process) = owner.and_then(|status| status.process) else { break };
+        if last.replace(process) != Some(process)
+            && let Some(pid) = Pid::from_raw(process.pid as i32)
+        {
+            let _ = kill_process(pid, Signal::KILL);
+        }
+        yield_now();
+    }
+    running.wait().expect_error(3, &["servo of robot C died"]);
+    assert_eq!(results.summary()["swaps"].as_array().map(Vec::len), Some(3));
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+}
+
+const VICTIM: ServiceId = ServiceId::Servo(2);
 
 #[test]
 fn a_service_that_freezes_again_and_again_for_a_moment_only_slows_the_run() {
@@ -135,7 +169,7 @@ fn services_end_with_a_supervisor_that_is_killed_and_the_next_run_cleans_up() {
 fn a_second_run_beside_the_first_disturbs_neither() {
     let (one, other) = (Results::new(), Results::new());
     let first = start(&one);
-    let second = start(&other);
+    let second = start_without_successors(&other);
     assert_ne!(first.directory(), second.directory());
     second.signal_service(ServiceId::Bridge, Signal::KILL);
     second.wait().expect_error(3, &["bridge died"]);

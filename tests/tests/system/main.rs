@@ -7,5 +7,7 @@ mod environment;
 mod faults;
 mod job;
 mod leader_follower;
+mod replay;
 mod report;
+mod succession;
 mod sweep;
