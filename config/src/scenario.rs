@@ -70,6 +70,9 @@ pub struct Scenario {
     /// What happens to processes that die.
     #[serde(default)]
     pub supervision: Supervision,
+    /// What stops the team.
+    #[serde(default)]
+    pub safety: Safety,
 }
 
 impl Scenario {
@@ -352,5 +355,56 @@ pub struct Supervision {
 impl Default for Supervision {
     fn default() -> Self {
         Self { restart_limit: 3 }
+    }
+}
+
+/// What stops the team: limits that no run comes near in which all is well.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Safety {
+    /// Largest force that a hand may apply to the object.
+    pub hand_force_max_n: f64,
+    /// Largest moment.
+    pub hand_moment_max_nm: f64,
+    /// Smallest distance of a robot's zero moment point from the edge of its support, as it feels it.
+    pub zmp_margin_min_m: f64,
+    /// Largest angle between a robot's base and upright.
+    pub tilt_max_rad: f64,
+    /// For how long a drive may give all the torque it has.
+    pub torque_limit_s: f64,
+    /// What the operator says, and when.
+    pub operator: Vec<OperatorEvent>,
+}
+
+/// The operator says something.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OperatorEvent {
+    /// When.
+    pub at_s: f64,
+    /// What.
+    pub says: OperatorWord,
+}
+
+/// What an operator can say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OperatorWord {
+    /// Stop the team.
+    Stop,
+    /// Go on after a safe stop.
+    Resume,
+}
+
+impl Default for Safety {
+    fn default() -> Self {
+        Self {
+            hand_force_max_n: 300.0,
+            hand_moment_max_nm: 100.0,
+            zmp_margin_min_m: 0.0,
+            tilt_max_rad: 0.2,
+            torque_limit_s: 0.5,
+            operator: vec![],
+        }
     }
 }

@@ -26,6 +26,6 @@ pub use limits::{
 };
 pub use payloads::{
     JointCommand, ObjectTruth, PoseWire, RobotState, RobotTruth, Sensors, TeamCommand, TeamState, TwistWire,
-    WrenchWire, all_hands, flag, mode,
+    WrenchWire, all_hands, flag, mode, operator, stop_cause,
 };
 pub use service::ServiceId;

@@ -20,7 +20,8 @@ pub mod mode {
     pub const HOLD: u64 = 1;
     /// The hybrid law controls object and internal forces; the team may walk.
     pub const CARRY: u64 = 2;
-    /// A fault ended the run: every command is constant.
+    /// Something is wrong, or the operator has stopped the team: the object comes to rest, the feet finish their
+    /// step, and hands that hold go on to hold.
     pub const SAFE_STOP: u64 = 3;
     /// Open hands move to where they will grasp.
     pub const APPROACH: u64 = 4;
@@ -54,6 +55,60 @@ pub mod mode {
     }
 }
 
+/// Why a team is in a safe stop, as `TeamState::stop_cause` carries it.
+pub mod stop_cause {
+    /// The operator wanted it.
+    pub const OPERATOR: u64 = 1;
+    /// What a robot's sensors or its servo said was not finite, or out of range.
+    pub const INPUT: u64 = 2;
+    /// A hand pushes or pulls harder than it may.
+    pub const HAND_WRENCH: u64 = 3;
+    /// A robot's zero moment point is at the edge of its support.
+    pub const BALANCE: u64 = 4;
+    /// A robot leans.
+    pub const TILT: u64 = 5;
+    /// A drive stands at its torque limit.
+    pub const TORQUE: u64 = 6;
+    /// A hand that should hold the object does not.
+    pub const GRASP: u64 = 7;
+
+    /// All of them.
+    pub const ALL: [u64; 7] = [OPERATOR, INPUT, HAND_WRENCH, BALANCE, TILT, TORQUE, GRASP];
+
+    /// Its code in summaries.
+    pub const fn name(cause: u64) -> &'static str {
+        match cause {
+            OPERATOR => "operator-stop",
+            INPUT => "input-rejected",
+            HAND_WRENCH => "hand-wrench",
+            BALANCE => "balance-margin",
+            TILT => "tilt",
+            TORQUE => "torque-limit",
+            GRASP => "grasp-lost",
+            _ => "unknown",
+        }
+    }
+}
+
+/// What an operator can say, as `TeamState::operator_word` carries it: the command in the lowest eight bits, a
+/// number that changes with every command above.
+pub mod operator {
+    /// Stop the team.
+    pub const STOP: u64 = 1;
+    /// Go on after a safe stop.
+    pub const RESUME: u64 = 2;
+
+    /// The word that says this after `last`.
+    pub const fn word_after(last: u64, command: u64) -> u64 {
+        ((last >> 8).wrapping_add(1) << 8) | (command & 0xff)
+    }
+
+    /// What a word says.
+    pub const fn command_of(word: u64) -> u64 {
+        word & 0xff
+    }
+}
+
 /// The first `count` hands, as sets of hands travel: bit h for grasping hand h.
 pub const fn all_hands(count: usize) -> u64 {
     let count = if count < MAX_HANDS { count } else { MAX_HANDS };
@@ -78,6 +133,8 @@ pub mod flag {
     pub const READY_TO_STEP: u64 = 1 << 6;
     /// It would swing the team's left foot first.
     pub const LEFT_FIRST: u64 = 1 << 7;
+    /// A drive gives all the torque it has.
+    pub const TORQUE_LIMIT: u64 = 1 << 8;
 }
 
 payload! {
@@ -100,6 +157,8 @@ payload! {
         pub imu_specific_force_m_s2: [f64; 3],
         /// Bit h: grasping hand h holds the object.
         pub holding_hands: u64,
+        /// 1 if the last joint command was unusable: the drives hold the one before.
+        pub command_rejected: u64,
     }
 }
 
@@ -196,6 +255,12 @@ payload! {
         pub step_clock: [u64; 4],
         /// One of [`mode`].
         pub team_mode: u64,
+        /// What the operator has said last, by this tick; 0 before the first word.
+        pub operator_word: u64,
+        /// Why the team is in a safe stop: one of [`stop_cause`], 0 if it is not.
+        pub stop_cause: u64,
+        /// Which robot's fault that is, plus one; 0 if nobody's.
+        pub stop_robot: u64,
     }
 }
 

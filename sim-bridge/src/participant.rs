@@ -2,7 +2,9 @@
 
 use crate::{BuildWorldError, World};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Frame, JointCommand, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId};
+use mikoshi_ipc_types::{
+    Frame, JointCommand, MAX_JOINTS, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId,
+};
 use mikoshi_runtime::{
     Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, Transport,
     state_schema,
@@ -10,7 +12,7 @@ use mikoshi_runtime::{
 use thiserror::Error;
 
 /// Of the layout of a world's checkpoint: another one gets another number.
-const STATE_VERSION: u64 = 1;
+const STATE_VERSION: u64 = 2;
 
 /// Why a bridge could not be made.
 #[derive(Debug, Error)]
@@ -90,12 +92,31 @@ impl<T: Transport> BridgeParticipant<T> {
     }
 
     fn step(&mut self, tick: u64) -> Result<(), TickError> {
-        for (ports, command) in self.robots.iter_mut().zip(&mut self.commands) {
-            ports.command.receive(tick, &mut self.frame)?;
-            *command = self.frame.payload;
+        let mut rejected = 0;
+        let robots = self.robots.iter_mut().zip(&mut self.commands).zip(self.world.commands());
+        for (robot, ((ports, command), last)) in robots.enumerate() {
+            match ports.command.receive(tick, &mut self.frame) {
+                Ok(()) if is_credible(&self.frame.payload, last) => *command = self.frame.payload,
+                // Drives hold what they were told last.
+                Ok(()) | Err(TickError::NotFinite { .. }) => {
+                    *command = JointCommand { joint_velocity_ref_rad_s: [0.0; MAX_JOINTS], ..*last };
+                    rejected |= 1 << robot;
+                }
+                Err(error) => return Err(error),
+            }
         }
+        self.world.note_rejected(rejected);
         self.world.step(&self.commands).map_err(|error| TickError::Service(error.text()))
     }
+}
+
+/// How far a joint's reference may come in a tick: forty turns a second are a mistake.
+const ABSURD_STEP_RAD: f64 = 1.0;
+
+/// Whether drives may follow this command after the last one.
+fn is_credible(command: &JointCommand, last: &JointCommand) -> bool {
+    let steps = command.joint_position_ref_rad.iter().zip(&last.joint_position_ref_rad);
+    steps.into_iter().all(|(to, from)| (to - from).abs() <= ABSURD_STEP_RAD)
 }
 
 impl<T: Transport> Participant for BridgeParticipant<T> {

@@ -53,6 +53,8 @@ struct Scratch {
     tallies: Box<[Tally]>,
     contacts: Contacts,
     hand_wrenches: Box<[[Wrench<mikoshi_spatial::World>; MAX_HANDS]]>,
+    /// Robots whose command of this tick could not be used.
+    rejected: u64,
     simulator_state: Box<[f64]>,
 }
 
@@ -145,6 +147,7 @@ impl World {
             tallies: vec![Tally::empty(); robots.len()].into(),
             contacts: Contacts::default(),
             hand_wrenches: vec![[Wrench::zero(); MAX_HANDS]; robots.len()].into(),
+            rejected: 0,
             simulator_state: vec![0.0; state_size].into(),
         };
         let fingerprint = xxh3_64(format!("{} {xml}", mujoco_rs::mujoco_version()).as_bytes());
@@ -166,6 +169,16 @@ impl World {
     /// Names the model and the simulator: worlds that have the same can load one another's checkpoints.
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
+    }
+
+    /// The commands of the last tick.
+    pub fn commands(&self) -> &[JointCommand] {
+        &self.state.commands
+    }
+
+    /// Says in the next readings whose joint command could not be used: bit r for robot r.
+    pub fn note_rejected(&mut self, robots: u64) {
+        self.scratch.rejected = robots;
     }
 
     /// The tick that the world is at.
@@ -366,12 +379,15 @@ impl World {
         let rings = self.state.readings.chunks_exact_mut(self.depth);
         let robots = self.layout.robots.iter().zip(&self.scratch.tallies).zip(&self.scratch.hand_wrenches);
         let holding = self.state.holding.iter();
+        let mut rejected = core::mem::take(&mut self.scratch.rejected);
         for (((((layout, tally), wrenches), ring), holding), (truth, noise)) in
             robots.zip(rings).zip(holding).zip(self.state.robots.iter_mut().zip(&self.noise))
         {
             let reading = &mut ring[place];
             readings::read(&self.data, layout, tally, reading);
             reading.holding_hands = *holding;
+            reading.command_rejected = rejected & 1;
+            rejected >>= 1;
             if let Some(noise) = noise {
                 noise.add(tick, reading);
             }

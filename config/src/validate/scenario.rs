@@ -13,6 +13,9 @@ const MAX_SENSOR_DELAY_TICKS: u64 = 1000;
 /// Longest run: a day at 1 kHz.
 const MAX_TICKS: f64 = 86.4e6;
 
+/// Highest foot of a step.
+const MAX_LIFT_M: f64 = 0.3;
+
 /// `a / b` if that is a whole number of at least 1.
 fn whole_ratio(a: f64, b: f64) -> Option<f64> {
     let ratio = a / b;
@@ -61,7 +64,14 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     }
     checks.positive("gait.double_support_s", scenario.gait.double_support_s);
     checks.positive("gait.single_support_s", scenario.gait.single_support_s);
-    checks.positive("gait.lift_m", scenario.gait.lift_m);
+    let lift_m = scenario.gait.lift_m;
+    checks.require(
+        lift_m > 0.0 && lift_m <= MAX_LIFT_M,
+        "gait.lift_m",
+        lift_m,
+        format_args!("more than 0, at most {MAX_LIFT_M} m"),
+    );
+    safety(&mut checks, scenario);
     checks.not_negative("physics.friction", scenario.physics.friction);
     world(&mut checks, scenario);
     let sensors = &scenario.sensors;
@@ -80,6 +90,18 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
         );
     }
     checks.0
+}
+
+fn safety(checks: &mut Checks, scenario: &Scenario) {
+    let safety = &scenario.safety;
+    checks.positive("safety.hand_force_max_n", safety.hand_force_max_n);
+    checks.positive("safety.hand_moment_max_nm", safety.hand_moment_max_nm);
+    checks.finite("safety.zmp_margin_min_m", safety.zmp_margin_min_m);
+    checks.positive("safety.tilt_max_rad", safety.tilt_max_rad);
+    checks.positive("safety.torque_limit_s", safety.torque_limit_s);
+    for (index, event) in safety.operator.iter().enumerate() {
+        checks.not_negative(format_args!("safety.operator.{index}.at_s"), event.at_s);
+    }
 }
 
 fn world(checks: &mut Checks, scenario: &Scenario) {

@@ -10,7 +10,7 @@ use crate::{FaultCode, Position, TickError};
 use core::fmt;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use memmap2::MmapRaw;
-use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId};
+use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId, operator};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::unix::fs::OpenOptionsExt;
@@ -310,10 +310,12 @@ struct Header {
     succession: AtomicU32,
     /// Changes with every successor.
     generation: AtomicU32,
+    /// What the operator has said last.
+    operator: AtomicU64,
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi3");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi4");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -451,6 +453,17 @@ impl Board {
 
     pub(crate) fn succession_is_promised(&self) -> bool {
         self.header().succession.load(Ordering::Acquire) != 0
+    }
+
+    /// Lets the operator say something: the coordinator hears it at its next tick.
+    pub fn say(&self, command: u64) {
+        let last = self.operator_word();
+        self.header().operator.store(operator::word_after(last, command), Ordering::Release);
+    }
+
+    /// What the operator has said last.
+    pub fn operator_word(&self) -> u64 {
+        self.header().operator.load(Ordering::Acquire)
     }
 
     /// Tells all others that a process has taken another one's place.

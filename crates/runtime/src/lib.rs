@@ -40,6 +40,7 @@ pub use topic::Topic;
 pub use transport::iceoryx::{IceoryxTap, IceoryxTransport, OpenError, required_bytes};
 pub use transport::memory::{InMemoryHub, InMemoryTap, InMemoryTransport};
 pub use transport::{
-    ConnectError, InOrder, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport,
+    ConnectError, InOrder, Loan, OBSERVER_DEPTH, Observer, OperatorPort, Publisher, Subscriber, Tap,
+    Transport,
 };
 pub use wait::WaitPolicy;

@@ -104,6 +104,10 @@ pub enum Command {
     /// Replace a process of a run by another one, while the run goes on
     #[command(after_help = SWAP_EXAMPLES)]
     Swap(SwapArguments),
+    /// Stop the team: the object comes to rest, feet finish their step, hands go on to hold
+    Stop(OperatorArguments),
+    /// Let the team go on after a stop, once nothing is wrong
+    Resume(OperatorArguments),
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
@@ -182,6 +186,14 @@ pub struct SwapArguments {
     /// Another build's program
     #[arg(long, value_name = "FILE")]
     pub program: Option<PathBuf>,
+}
+
+/// `mikoshi stop`, `mikoshi resume`.
+#[derive(Args, Debug)]
+pub struct OperatorArguments {
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
 }
 
 /// `mikoshi report`.

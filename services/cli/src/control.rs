@@ -32,6 +32,10 @@ pub enum Request {
         #[serde(default)]
         program: Option<PathBuf>,
     },
+    /// The team stops, and stands.
+    Stop,
+    /// The team goes on after a safe stop.
+    Resume,
 }
 
 /// What came of it.

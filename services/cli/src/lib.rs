@@ -26,11 +26,11 @@ mod progress;
 mod pull;
 pub mod replay;
 mod report;
+mod requests;
 mod revise;
 mod standstill;
 mod succession;
 mod supervisor;
-mod swaps;
 mod sweep;
 mod table;
 mod wall_clock;
@@ -51,6 +51,8 @@ pub fn main_of_command() -> ExitCode {
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
         Command::Replay(_) => become_in_process(),
         Command::Swap(arguments) => commands::swap::swap(arguments).map(|()| Status::Met),
+        Command::Stop(arguments) => commands::operator::stop(arguments).map(|()| Status::Met),
+        Command::Resume(arguments) => commands::operator::resume(arguments).map(|()| Status::Met),
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),

@@ -1,15 +1,16 @@
 //! Watches a run tick by tick, and says at the end what it came to.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, as_lines};
 use crate::judge;
 use crate::observed_run::observed_run;
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
+use crate::print::print_error;
 use crate::progress::Progress;
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::ServiceId;
+use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
     Fault, Figures, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
 };
@@ -22,6 +23,7 @@ pub struct RunObserver {
     progress: Progress,
     stamps: Stamps,
     swaps: Vec<Swap>,
+    stops: Stops,
     ticks: u64,
     clock: Stopwatch,
 }
@@ -40,6 +42,7 @@ impl RunObserver {
             progress: Progress::new(run.ticks, run.scenario.control_period_s, is_shown),
             stamps: Stamps::default(),
             swaps: vec![],
+            stops: Stops::of(run),
             ticks: 0,
             clock: Stopwatch::start(),
         })
@@ -54,6 +57,7 @@ impl RunObserver {
         self.figures.observe(observation);
         self.stamps.observe(observation.object_truth.envelope.stamp_ns);
         self.log.write(observation)?;
+        self.stops.observe(observation.tick(), &observation.team_state.payload);
         self.ticks += 1;
         self.progress.set_ticks(self.ticks);
         Ok(())
@@ -108,7 +112,7 @@ impl RunObserver {
             drift_between_robots_m: figures.drift_between_robots_m,
             unintended_contact_ticks: figures.unintended_contact_ticks,
             timing: self.stamps.timing(),
-            faults,
+            faults: [self.stops.faults, faults].concat(),
             swaps: self.swaps,
         };
         if self.ticks < run.ticks {
@@ -118,6 +122,32 @@ impl RunObserver {
         }
         summary.passed = summary.failures.is_empty();
         Ok(summary)
+    }
+}
+
+/// Why and when the team stopped for safety's sake.
+struct Stops {
+    robots: Vec<String>,
+    cause: u64,
+    faults: Vec<Fault>,
+}
+
+impl Stops {
+    fn of(run: &RunSpec) -> Self {
+        let robots = run.robots.iter().map(|robot| robot.member.name.clone()).collect();
+        Self { robots, cause: 0, faults: vec![] }
+    }
+
+    fn observe(&mut self, tick: u64, team: &TeamState) {
+        if core::mem::replace(&mut self.cause, team.stop_cause) == team.stop_cause || team.stop_cause == 0 {
+            return;
+        }
+        let robot =
+            (team.stop_robot as usize).checked_sub(1).and_then(|index| self.robots.get(index)).cloned();
+        let code = stop_cause::name(team.stop_cause).to_owned();
+        let of_robot = robot.as_ref().map_or_else(String::new, |robot| format!(", robot {robot}"));
+        print_error(&as_lines("warning", &format!("safe stop in tick {tick}: {code}{of_robot}")));
+        self.faults.push(Fault { tick, service: "coordinator".to_owned(), robot, code });
     }
 }
 

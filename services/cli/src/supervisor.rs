@@ -10,9 +10,9 @@ use crate::outcome::{Outcome, fault_of, label_of, robot_name, swap_of};
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
 use crate::print::print_error;
+use crate::requests::Requests;
 use crate::standstill::Standstill;
 use crate::succession::{Succession, Vacancy};
-use crate::swaps::Swaps;
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
@@ -92,7 +92,7 @@ struct Supervisor {
     team_tap: TeamTap<IceoryxTap>,
     member: Member,
     succession: Succession,
-    swaps: Swaps,
+    requests: Requests,
 }
 
 impl Supervisor {
@@ -107,14 +107,14 @@ impl Supervisor {
         let join = |role| join(role).map_err(Failure::fault);
         let member = join(Role::Supervisor)?;
         let tap = IceoryxTap::open(directory, join(Role::Tap)?, schedule).map_err(Failure::fault)?;
-        let swaps = Swaps::listen(directory).map_err(Failure::fault)?;
+        let requests = Requests::listen(directory).map_err(Failure::fault)?;
         let mut children = Children::of(directory, logs);
         for service in schedule.services() {
             children.spawn(service, label_of(run, service), robot_name(run, service))?;
         }
         // While services set themselves up.
         let team_tap = TeamTap::new(&tap, run.robots.len()).map_err(Failure::fault)?;
-        Ok(Self { children, tap, team_tap, member, succession, swaps })
+        Ok(Self { children, tap, team_tap, member, succession, requests })
     }
 
     fn watch(&mut self, prepared: &Prepared, observer: &mut RunObserver, interrupts: &Interrupts) -> Watched {
@@ -168,12 +168,12 @@ impl Supervisor {
     /// Sees to successors of processes that were killed; `false` if somebody is lost for good.
     fn look_after(&mut self, run: &RunSpec, observer: &mut RunObserver) -> bool {
         self.children.look();
-        self.swaps.look(run, self.member.board(), &mut self.children, observer);
+        self.requests.look(run, self.member.board(), &mut self.children, observer);
         let fallen = self.children.processes().iter().filter(|process| {
             let has_failed = process.ended.is_some_and(|ended| !ended.status.success());
             // Whose successor waits already needs no other.
             let is_succeeded =
-                self.succession.is_due(process.service) || self.swaps.is_pending(process.service);
+                self.succession.is_due(process.service) || self.requests.is_pending(process.service);
             has_failed && !is_succeeded
         });
         let fallen: Vec<_> = fallen.map(|process| (process.service, process.signal())).collect();

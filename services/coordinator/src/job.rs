@@ -280,6 +280,23 @@ impl Phase {
         matches!(self, Self::Settling { .. } | Self::Unloading { .. })
     }
 
+    /// The same a tick later: nothing of it passes while the team is stopped.
+    pub(crate) fn delayed(mut self) -> Self {
+        match &mut self {
+            Self::Approaching { since }
+            | Self::Grasping { since }
+            | Self::Settling { since }
+            | Self::Lifting { since }
+            | Self::Lowering { since, .. }
+            | Self::Unloading { since, .. }
+            | Self::Opening { since }
+            | Self::Withdrawing { since } => *since += 1,
+            // The operator's motion has a clock of its own.
+            Self::Carrying { .. } | Self::Waiting | Self::Done | Self::Failed { .. } => {}
+        }
+        self
+    }
+
     /// As words.
     pub(crate) fn to_words(self) -> PhaseWords {
         PhaseWords(match self {

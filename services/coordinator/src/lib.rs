@@ -14,6 +14,7 @@ mod leading;
 mod object_motion;
 mod participant;
 mod reference;
+mod safety;
 mod step_clock;
 mod tick;
 

@@ -1,11 +1,13 @@
 //! The coordinator on a transport.
 
 use crate::build::BuildCoordinatorError;
+use crate::safety::is_credible;
 use crate::tick::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState, STATE_VERSION};
+use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Frame, Payload, RobotState, ServiceId, TeamCommand, TeamState};
+use mikoshi_ipc_types::{Frame, Payload, RobotState, ServiceId, TeamCommand, TeamState, flag};
 use mikoshi_runtime::{
-    Call, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, state_schema,
+    Call, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, state_schema,
 };
 
 /// The coordinator with its ports.
@@ -15,10 +17,13 @@ pub struct CoordinatorParticipant<T: Transport> {
     scratch: CoordinatorScratch,
     /// Of the last ticks, tick k at place k mod their number: as many as some robot may still wait for.
     outputs: Vec<CoordinatorOutputs>,
-    robot_states: Vec<Frame<RobotState>>,
+    arrived: Frame<RobotState>,
+    /// The last that could be used.
+    robot_states: Vec<RobotState>,
     robot_state_ports: Vec<T::Subscriber<RobotState>>,
     command_ports: Vec<T::Publisher<TeamCommand>>,
     team_state_port: T::Publisher<TeamState>,
+    operator: OperatorPort,
 }
 
 impl<T: Transport> CoordinatorParticipant<T> {
@@ -33,19 +38,33 @@ impl<T: Transport> CoordinatorParticipant<T> {
             state: coordinator.initial_state()?,
             scratch: coordinator.scratch(),
             outputs: vec![CoordinatorOutputs::default(); run.scenario.coordination_delay_ticks as usize + 1],
-            robot_states: vec![Frame::zeroed(); run.robots.len()],
+            arrived: Frame::zeroed(),
+            robot_states: vec![RobotState::zeroed(); run.robots.len()],
             robot_state_ports: robots.clone().map(|r| transport.subscriber(r)).collect::<Result<_, _>>()?,
             command_ports: robots.map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
             team_state_port: transport.publisher(0)?,
+            operator: transport.operator(),
             coordinator,
         })
     }
 
     fn coordinate(&mut self, tick: u64) -> Result<(), TickError> {
-        for (port, frame) in self.robot_state_ports.iter_mut().zip(&mut self.robot_states) {
-            port.receive(tick, frame)?;
+        let hands = self.coordinator.hands_of_robots().iter();
+        let ports = self.robot_state_ports.iter_mut().zip(&mut self.robot_states).zip(hands);
+        for ((port, believed), &hands) in ports {
+            let last = (tick > 0).then_some(&*believed);
+            match port.receive(tick, &mut self.arrived) {
+                Ok(()) if is_credible(&self.arrived.payload, last, hands) => *believed = self.arrived.payload,
+                // The last good one serves until the team has stopped.
+                Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => {
+                    believed.flags |= flag::INPUT_REJECTED
+                }
+                Ok(()) => return Err(TickError::Service("a robot says what can't be")),
+                Err(error) => return Err(error),
+            }
         }
-        let robots = self.robot_states.iter().map(|frame| &frame.payload);
+        self.state.hear_operator(self.operator.word());
+        let robots = self.robot_states.iter();
         let outputs = of_tick(&mut self.outputs, tick)?;
         self.coordinator
             .tick(tick, &mut self.state, &mut self.scratch, robots, outputs)
@@ -80,11 +99,14 @@ impl<T: Transport> Participant for CoordinatorParticipant<T> {
 }
 
 impl<T: Transport> CoordinatorParticipant<T> {
-    /// State and outputs as bytes: all that a checkpoint holds.
+    /// State, what robots said last, and outputs as bytes: all that a checkpoint holds.
     fn parts(&mut self) -> impl Iterator<Item = &mut [u8]> {
         let robots = self.command_ports.len();
         let state = bytemuck::bytes_of_mut(&mut self.state);
-        core::iter::once(state).chain(self.outputs.iter_mut().flat_map(move |outputs| outputs.parts(robots)))
+        let heard = bytemuck::cast_slice_mut(&mut self.robot_states);
+        [state, heard]
+            .into_iter()
+            .chain(self.outputs.iter_mut().flat_map(move |outputs| outputs.parts(robots)))
     }
 }
 
@@ -93,6 +115,7 @@ impl<T: Transport> Replaceable for CoordinatorParticipant<T> {
         let parts = [
             TeamCommand::SCHEMA_HASH,
             TeamState::SCHEMA_HASH,
+            RobotState::SCHEMA_HASH,
             self.command_ports.len() as u64,
             self.outputs.len() as u64,
             size_of::<CoordinatorState>() as u64,
@@ -102,7 +125,8 @@ impl<T: Transport> Replaceable for CoordinatorParticipant<T> {
 
     fn state_bytes(&self) -> usize {
         let of_tick = self.command_ports.len() * size_of::<TeamCommand>() + size_of::<TeamState>();
-        size_of::<CoordinatorState>() + self.outputs.len() * of_tick
+        let heard = size_of_val(&*self.robot_states);
+        size_of::<CoordinatorState>() + heard + self.outputs.len() * of_tick
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {

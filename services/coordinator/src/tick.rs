@@ -6,6 +6,7 @@ use crate::job::{Job, Phase, PhaseWords, Seen};
 use crate::leading::{Leading, LeadingState};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::reference::References;
+use crate::safety::{Safety, SafetyState};
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
@@ -40,6 +41,7 @@ pub struct Coordinator {
     motion: ObjectMotion,
     timing: StepTiming,
     job: Job,
+    safety: Safety,
     /// When the object is first asked to move, by the job's clock of the motion; it never is when absent.
     motion_start_tick: Option<u64>,
     hands_of_robots: Vec<usize>,
@@ -50,7 +52,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 1;
+pub(crate) const STATE_VERSION: u64 = 2;
 
 /// All that matters between ticks.
 #[repr(C)]
@@ -69,6 +71,9 @@ pub struct CoordinatorState {
     /// The tick in which it started, or in which another one took its place.
     hybrid_since: u64,
     phase: PhaseWords,
+    safety: SafetyState,
+    /// What the operator has said last.
+    operator_word: u64,
 }
 
 // SAFETY: zeros are a valid value of integers and floats.
@@ -137,6 +142,7 @@ impl Coordinator {
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
             job: Job::new(scenario),
+            safety: Safety::new(scenario),
             hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
             sticks: virtual_sticks(run)?,
             X_WA_start: Pose::new(
@@ -160,7 +166,14 @@ impl Coordinator {
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             hybrid_since: 0,
             phase: Phase::default().to_words(),
+            safety: SafetyState::default(),
+            operator_word: 0,
         })
+    }
+
+    /// Grasping hands of each robot.
+    pub(crate) fn hands_of_robots(&self) -> &[usize] {
+        &self.hands_of_robots
     }
 
     /// Workspaces of its size.
@@ -190,15 +203,21 @@ impl Coordinator {
         let wishes = Wishes::of(robots.clone());
 
         let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
+        let mut safety = state.safety;
+        let of_team = robots.clone().zip(self.hands_of_robots.iter().copied());
+        let shall_hold = mode::is_hybrid(phase.mode());
+        self.safety.look(&mut safety, tick, of_team, shall_hold, state.operator_word);
+        let is_stopped = safety.is_stopped();
         let is_free = self.job.is_in_the_air(&phase) && !self.presses;
         let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands, is_free)?;
         let is_hybrid = mode::is_hybrid(phase.mode());
         let motion_ticks = self.job.motion_ticks(&phase, tick);
         let is_moving = motion_ticks.zip(self.motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
-        let speed_share = if is_moving { wishes.speed_share } else { 0.0 };
+        let speed_share = if is_moving && !is_stopped { wishes.speed_share } else { 0.0 };
         // State changes only when nothing can fail any more.
         let mut motion = state.motion;
         let X_WA_ref = match self.job.object_step_m(&phase, tick) {
+            Some(_) if is_stopped => self.motion.lift(&mut motion, 0.0),
             Some(step_m) => self.motion.lift(&mut motion, step_m),
             None => self.motion.advance(&mut motion, speed_share),
         };
@@ -225,14 +244,19 @@ impl Coordinator {
                 .and_then(|()| leading.advance_clocks(&mut state.leading, &self.timing, &wishes))
                 .ok_or(CoordinateError::State)?;
         }
-        (state.motion, state.clock, state.hand_wrench) = (motion, clock, hand_wrench);
-        move_open_hands(state, &mut law_output.hands, self.job.hand_step_m(&phase, tick));
+        (state.motion, state.clock, state.hand_wrench, state.safety) = (motion, clock, hand_wrench, safety);
+        let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
+        move_open_hands(state, &mut law_output.hands, hand_step_m);
 
         self.write_commands(tick, state, &phase, law_output, out);
         let reference = is_hybrid.then_some((&*force_ref, &*position_ref));
         write_team_state(state, &phase, law_output, reference, out);
         out.team_state.speed_share = speed_share;
 
+        if is_stopped {
+            state.phase = phase.delayed().to_words();
+            return Ok(());
+        }
         let seen = self.look(state, hands, robots, &wishes, law_output);
         let next = self.job.next(phase, tick + 1, &seen);
         if next != phase {
@@ -310,7 +334,7 @@ impl Coordinator {
         for (command, (&hands, own_clock)) in out.commands.iter_mut().zip(robots) {
             let clock = if self.leading.is_some() { own_clock } else { &state.clock };
             *command = TeamCommand {
-                team_mode: phase.mode(),
+                team_mode: mode_of(state, phase),
                 state_tick: tick,
                 step_clock: clock.clock,
                 closed_hands: if self.job.closes_hands(phase) { all_hands(hands) } else { 0 },
@@ -340,6 +364,13 @@ impl CoordinatorScratch {
         }
         self.law_output.force.internal.fill(Wrench::from_array(&[nan; 6]));
         self.law_output.position.internal.fill(Twist::from_array(&[nan; 6]));
+    }
+}
+
+impl CoordinatorState {
+    /// Hears the operator: this is the last word.
+    pub(crate) fn hear_operator(&mut self, word: u64) {
+        self.operator_word = word;
     }
 }
 
@@ -406,6 +437,11 @@ fn move_open_hands(state: &mut CoordinatorState, references: &mut [HandReference
     }
 }
 
+/// The team's mode in a phase of its job.
+fn mode_of(state: &CoordinatorState, phase: &Phase) -> u64 {
+    if state.safety.is_stopped() { mode::SAFE_STOP } else { phase.mode() }
+}
+
 fn write_team_state(
     state: &CoordinatorState,
     phase: &Phase,
@@ -421,7 +457,10 @@ fn write_team_state(
         object_pose_ref: object_pose_ref.to_array(),
         object_twist_ref: state.motion.twist,
         step_clock: state.clock.clock,
-        team_mode: phase.mode(),
+        team_mode: mode_of(state, phase),
+        operator_word: state.safety.operator_word,
+        stop_cause: state.safety.cause,
+        stop_robot: state.safety.robot,
         ..TeamState::zeroed()
     };
     write_force(&law.force, &mut team_state.generalized_force);

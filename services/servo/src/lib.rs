@@ -8,6 +8,7 @@
 
 #![allow(non_snake_case)]
 
+mod credible;
 mod legs;
 mod participant;
 mod robot;

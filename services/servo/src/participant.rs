@@ -4,7 +4,7 @@ use crate::robot::BuildRobotError;
 use crate::tick::{STATE_VERSION, Servo, ServoScratch, ServoState};
 use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, TeamCommand};
+use mikoshi_ipc_types::{Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, TeamCommand, flag};
 use mikoshi_runtime::{
     Call, ConnectError, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_state,
     state_schema, write_state,
@@ -27,8 +27,14 @@ pub struct ServoParticipant<T: Transport> {
     state: ServoState,
     scratch: ServoScratch,
     coordination_delay_ticks: u64,
-    sensors: Frame<Sensors>,
-    command: Frame<TeamCommand>,
+    arrived_sensors: Frame<Sensors>,
+    arrived_command: Frame<TeamCommand>,
+    /// The last that could be used.
+    sensors: Sensors,
+    /// The last that could be used.
+    command: TeamCommand,
+    /// 1 if the last command could not.
+    command_rejected: u64,
     robot_state: RobotState,
     joint_command: JointCommand,
     sensor_port: T::Subscriber<Sensors>,
@@ -53,8 +59,11 @@ impl<T: Transport> ServoParticipant<T> {
             scratch: servo.scratch(),
             servo,
             coordination_delay_ticks: run.scenario.coordination_delay_ticks,
-            sensors: Frame::zeroed(),
-            command: Frame::zeroed(),
+            arrived_sensors: Frame::zeroed(),
+            arrived_command: Frame::zeroed(),
+            sensors: Sensors::zeroed(),
+            command: TeamCommand::zeroed(),
+            command_rejected: 0,
             robot_state: RobotState::zeroed(),
             joint_command: JointCommand::zeroed(),
             sensor_port: transport.subscriber(index)?,
@@ -65,19 +74,39 @@ impl<T: Transport> ServoParticipant<T> {
     }
 
     fn sense(&mut self, tick: u64) -> Result<(), TickError> {
-        self.sensor_port.receive(tick, &mut self.sensors)?;
+        let mut rejected = core::mem::take(&mut self.command_rejected);
+        match self.sensor_port.receive(tick, &mut self.arrived_sensors) {
+            Ok(()) if self.servo.believes(&self.arrived_sensors.payload) => {
+                self.sensors = self.arrived_sensors.payload;
+            }
+            // The last good ones serve until the team has stopped.
+            Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => rejected = 1,
+            Ok(()) => return Err(TickError::Service("the sensors say what can't be")),
+            Err(error) => return Err(error),
+        }
         self.robot_state = RobotState::zeroed();
-        let sensors = &self.sensors.payload;
-        self.servo.sense(&mut self.state, &mut self.scratch, sensors, &mut self.robot_state);
+        self.servo.sense(&mut self.state, &mut self.scratch, &self.sensors, &mut self.robot_state);
+        if rejected | self.sensors.command_rejected != 0 {
+            self.robot_state.flags |= flag::INPUT_REJECTED;
+        }
         Ok(())
     }
 
     fn act(&mut self, tick: u64) -> Result<(), TickError> {
         // In the first ticks of a delayed coordination there is no command yet: the servo holds.
-        let command = match tick.checked_sub(self.coordination_delay_ticks) {
+        let first = self.coordination_delay_ticks;
+        let command = match tick.checked_sub(first) {
             Some(command_tick) => {
-                self.command_port.receive(command_tick, &mut self.command)?;
-                Some(&self.command.payload)
+                match self.command_port.receive(command_tick, &mut self.arrived_command) {
+                    Ok(()) if self.servo.accepts(&self.arrived_command.payload, &self.robot_state) => {
+                        self.command = self.arrived_command.payload;
+                    }
+                    // Said in the next state.
+                    Ok(()) | Err(TickError::NotFinite { .. }) if tick > first => self.command_rejected = 1,
+                    Ok(()) => return Err(TickError::Service("the coordinator asks for what can't be")),
+                    Err(error) => return Err(error),
+                }
+                Some(&self.command)
             }
             None => None,
         };
@@ -85,6 +114,17 @@ impl<T: Transport> ServoParticipant<T> {
         self.servo
             .act(&mut self.state, &mut self.scratch, command, &mut self.joint_command)
             .map_err(|error| TickError::Service(error.text()))
+    }
+
+    /// What a checkpoint holds as it is: outputs, inputs that may serve again.
+    fn parts(&mut self) -> [&mut [u8]; 5] {
+        [
+            bytemuck::bytes_of_mut(&mut self.robot_state),
+            bytemuck::bytes_of_mut(&mut self.joint_command),
+            bytemuck::bytes_of_mut(&mut self.sensors),
+            bytemuck::bytes_of_mut(&mut self.command),
+            bytemuck::bytes_of_mut(&mut self.command_rejected),
+        ]
     }
 }
 
@@ -110,37 +150,51 @@ impl<T: Transport> Participant for ServoParticipant<T> {
     }
 }
 
-/// Bytes of the outputs, which a checkpoint begins with.
-const OUTPUT_BYTES: usize = size_of::<RobotState>() + size_of::<JointCommand>();
+/// What a checkpoint begins with.
+const PLAIN_BYTES: usize = size_of::<RobotState>()
+    + size_of::<JointCommand>()
+    + size_of::<Sensors>()
+    + size_of::<TeamCommand>()
+    + size_of::<u64>();
 
 impl<T: Transport> Replaceable for ServoParticipant<T> {
     fn state_schema(&self) -> u64 {
-        let joints = self.servo.joint_count() as u64;
-        state_schema("servo", STATE_VERSION, &[RobotState::SCHEMA_HASH, JointCommand::SCHEMA_HASH, joints])
+        let parts = [
+            RobotState::SCHEMA_HASH,
+            JointCommand::SCHEMA_HASH,
+            Sensors::SCHEMA_HASH,
+            TeamCommand::SCHEMA_HASH,
+            self.servo.joint_count() as u64,
+        ];
+        state_schema("servo", STATE_VERSION, &parts)
     }
 
     fn state_bytes(&self) -> usize {
         // An encoded vector has its length before it: at most as much again.
-        OUTPUT_BYTES + 2 * size_of::<ServoState>()
+        PLAIN_BYTES + 2 * size_of::<ServoState>()
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
-        let (outputs, state) =
-            checkpoint.split_at_mut_checked(OUTPUT_BYTES).ok_or(TickError::Checkpoint("no room"))?;
-        let (robot_state, joint_command) = outputs.split_at_mut(size_of::<RobotState>());
-        robot_state.copy_from_slice(bytemuck::bytes_of(&self.robot_state));
-        joint_command.copy_from_slice(bytemuck::bytes_of(&self.joint_command));
-        Ok(OUTPUT_BYTES + write_state(&self.state, state)?)
+        let (mut plain, state) =
+            checkpoint.split_at_mut_checked(PLAIN_BYTES).ok_or(TickError::Checkpoint("no room"))?;
+        for part in self.parts() {
+            let (head, tail) = plain.split_at_mut(part.len());
+            head.copy_from_slice(part);
+            plain = tail;
+        }
+        Ok(PLAIN_BYTES + write_state(&self.state, state)?)
     }
 
     fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
-        let (outputs, state) = checkpoint
-            .split_at_checked(OUTPUT_BYTES)
+        let (mut plain, state) = checkpoint
+            .split_at_checked(PLAIN_BYTES)
             .ok_or(TickError::Checkpoint("the state is too short"))?;
         self.state = read_state(state)?;
-        let (robot_state, joint_command) = outputs.split_at(size_of::<RobotState>());
-        self.robot_state = bytemuck::pod_read_unaligned(robot_state);
-        self.joint_command = bytemuck::pod_read_unaligned(joint_command);
+        for part in self.parts() {
+            let (head, tail) = plain.split_at(part.len());
+            part.copy_from_slice(head);
+            plain = tail;
+        }
         Ok(())
     }
 }

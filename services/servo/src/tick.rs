@@ -1,6 +1,7 @@
 //! One robot's tick, in two halves: `sense` says where it is, `act` says where it goes. No allocation,
 //! no clock, no I/O, no panic path.
 
+use crate::credible;
 use crate::legs::{Felt, HandReference, Legs, LegsState};
 use crate::robot::{BuildRobotError, Robot};
 use mikoshi_config::RunSpec;
@@ -19,6 +20,8 @@ use serde::{Deserialize, Serialize};
 
 /// Share of its weight below which a robot has no zero moment point to speak of.
 const LEAST_GROUND_FORCE: f64 = 0.1;
+/// Share of its limit at which a drive gives all it has, averaged over a tick.
+const FULL_TORQUE: f64 = 0.999;
 /// A hand that misses its reference by more is reported as behind.
 const HAND_TOLERANCE_M: f64 = 0.005;
 
@@ -32,7 +35,7 @@ pub struct Servo {
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 1;
+pub(crate) const STATE_VERSION: u64 = 2;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -123,6 +126,17 @@ impl Servo {
         self.robot.model.joint_count()
     }
 
+    /// Whether these readings may be its robot's.
+    pub(crate) fn believes(&self, sensors: &Sensors) -> bool {
+        credible::are_credible(sensors, &self.robot.model)
+    }
+
+    /// Whether its robot in this state may be asked for this.
+    pub(crate) fn accepts(&self, command: &TeamCommand, robot: &RobotState) -> bool {
+        let is_clock = StepClock::from_words(command.step_clock).is_some();
+        is_clock && credible::is_credible(command, robot, self.robot.palms.len())
+    }
+
     /// Workspaces of its size.
     pub fn scratch(&self) -> ServoScratch {
         ServoScratch { measured: self.robot.kinematics(), ik: IkScratch::new(&self.robot.model) }
@@ -144,7 +158,12 @@ impl Servo {
 
         let wish = self.legs.wish(&state.legs);
         let is_behind = state.flags & flag::HANDS_BEHIND != 0;
-        out.flags = state.flags | wish_flags(&StepWish { ready: wish.ready && !is_behind, ..wish });
+        let torques = self.robot.model.joints().iter().zip(&sensors.joint_torque_nm);
+        let is_at_limit =
+            torques.into_iter().any(|(joint, torque)| torque.abs() >= FULL_TORQUE * joint.effort);
+        out.flags = state.flags
+            | set(flag::TORQUE_LIMIT, is_at_limit)
+            | wish_flags(&StepWish { ready: wish.ready && !is_behind, ..wish });
         out.step_urgency = wish.urgency;
         out.speed_share = self.legs.speed_share(&state.legs);
         out.steps = state.legs.steps;
@@ -277,7 +296,9 @@ impl Servo {
             *reference = HandReference { pose, twist, wrench };
         }
         // Open hands carry nothing, and the feet need not follow them.
-        let grasping = if mode::is_hybrid(command.team_mode) { references.get(..count) } else { None };
+        let is_stopped_holding = command.team_mode == mode::SAFE_STOP && command.closed_hands != 0;
+        let holds = mode::is_hybrid(command.team_mode) || is_stopped_holding;
+        let grasping = if holds { references.get(..count) } else { None };
         let grasping = grasping.unwrap_or_default();
         let legs = self.legs.act(legs, clock, grasping, felt);
         Ok(IkTargets {

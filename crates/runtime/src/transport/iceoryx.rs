@@ -5,7 +5,8 @@
 
 use super::accept::{Verdict, judge};
 use super::{
-    ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport, consumer_depth,
+    ConnectError, Loan, OBSERVER_DEPTH, Observer, OperatorPort, Publisher, Subscriber, Tap, Transport,
+    consumer_depth,
 };
 use crate::board::{Role, State};
 use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
@@ -354,6 +355,11 @@ impl Transport for IceoryxTransport {
             phase,
             arrived: Box::new(Frame::zeroed()),
         })
+    }
+
+    fn operator(&self) -> OperatorPort {
+        let process = Rc::clone(&self.process);
+        OperatorPort(Box::new(move || process.member.board().operator_word()))
     }
 }
 

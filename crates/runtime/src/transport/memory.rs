@@ -5,12 +5,13 @@
 
 use super::accept::{Verdict, judge};
 use super::{
-    ConnectError, Loan, OBSERVER_DEPTH, Observer, Publisher, Subscriber, Tap, Transport, consumer_depth,
+    ConnectError, Loan, OBSERVER_DEPTH, Observer, OperatorPort, Publisher, Subscriber, Tap, Transport,
+    consumer_depth,
 };
 use crate::board::Charge;
 use crate::{Position, TickError, TickSchedule, Topic};
 use core::any::Any;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -27,17 +28,23 @@ pub struct InMemoryHub {
 struct Shared {
     schedule: TickSchedule,
     channels: RefCell<BTreeMap<Topic, Rc<dyn Any>>>,
+    operator: Cell<u64>,
 }
 
 impl InMemoryHub {
     /// A hub for the services of this schedule.
     pub fn new(schedule: TickSchedule) -> Self {
-        Self { shared: Rc::new(Shared { schedule, channels: RefCell::default() }) }
+        Self { shared: Rc::new(Shared { schedule, channels: RefCell::default(), operator: Cell::default() }) }
     }
 
     /// The ports of this service.
     pub fn transport(&self, service: ServiceId) -> InMemoryTransport {
         InMemoryTransport { hub: self.clone(), service }
+    }
+
+    /// Makes this the operator's last word.
+    pub fn set_operator_word(&self, word: u64) {
+        self.shared.operator.set(word);
     }
 
     /// The ports of an observer.
@@ -133,6 +140,11 @@ impl Transport for InMemoryTransport {
         }
         let depth = consumer_depth(&self.hub.shared.schedule, topic);
         Ok(InMemorySubscriber { topic, queue: self.hub.queue(topic, depth) })
+    }
+
+    fn operator(&self) -> OperatorPort {
+        let shared = Rc::clone(&self.hub.shared);
+        OperatorPort(Box::new(move || shared.operator.get()))
     }
 }
 

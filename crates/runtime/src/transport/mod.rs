@@ -64,6 +64,20 @@ pub trait Transport {
     /// # Errors
     /// The schedule does not name it as an input of the service; the transport has no room for it.
     fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<Self::Subscriber<P>, ConnectError>;
+
+    /// Where the operator is heard.
+    fn operator(&self) -> OperatorPort;
+}
+
+/// Hears the operator, whose words come at any time: whoever hears one says in which tick, so that a replay
+/// can hear it in the same.
+pub struct OperatorPort(pub(crate) Box<dyn Fn() -> u64>);
+
+impl OperatorPort {
+    /// What the operator has said last: [`TeamState::operator_word`](mikoshi_ipc_types::TeamState).
+    pub fn word(&self) -> u64 {
+        (self.0)()
+    }
 }
 
 /// The ports of an observer: any payload, ground truth included; it publishes nothing.

@@ -1,6 +1,7 @@
 //! One module per command.
 
 pub mod doctor;
+pub mod operator;
 pub mod plan;
 pub mod report;
 pub mod run;

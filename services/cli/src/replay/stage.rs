@@ -95,6 +95,7 @@ impl Stage {
     /// # Errors
     /// It could not execute the tick.
     pub fn execute(&mut self, recorded: &Observation) -> Result<Option<Difference>, TickError> {
+        self.hub.set_operator_word(recorded.team_state.payload.operator_word);
         self.hear(recorded)?;
         if self.oldest_use > 0 {
             self.recent.push_back(recorded.clone());

@@ -1,4 +1,5 @@
-//! Processes that are replaced on request, while they are in charge.
+//! What is asked for while a run goes on: processes that are replaced while they are in charge, and what the
+//! operator says.
 
 use crate::children::{Children, Variant};
 use crate::control::{Client, Control, Request};
@@ -6,13 +7,13 @@ use crate::observer::RunObserver;
 use crate::outcome::{label_of, robot_name, swap_of};
 use crate::revise::revise;
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::ServiceId;
+use mikoshi_ipc_types::{ServiceId, operator};
 use mikoshi_resolution::write_spec;
 use mikoshi_runtime::Board;
 use std::path::{Path, PathBuf};
 
-/// Requests of a run, and what has become of them so far.
-pub struct Swaps {
+/// Those of a run, and what has become of them so far.
+pub struct Requests {
     control: Control,
     run_directory: PathBuf,
     pending: Vec<Pending>,
@@ -30,7 +31,7 @@ struct Pending {
     revised: Option<RunSpec>,
 }
 
-impl Swaps {
+impl Requests {
     /// Of the run in this directory.
     ///
     /// # Errors
@@ -53,13 +54,24 @@ impl Swaps {
         children: &mut Children,
         observer: &mut RunObserver,
     ) {
-        if let Some((Request::Swap { service, set, program }, client)) = self.control.next() {
-            match self.begin(run, board, children, &service, &set, program) {
-                Ok((service, epoch, revised)) => {
-                    self.pending.push(Pending { service, epoch, client, revised });
+        match self.control.next() {
+            Some((Request::Swap { service, set, program }, client)) => {
+                match self.begin(run, board, children, &service, &set, program) {
+                    Ok((service, epoch, revised)) => {
+                        self.pending.push(Pending { service, epoch, client, revised });
+                    }
+                    Err(message) => client.refuse(message),
                 }
-                Err(message) => client.refuse(message),
             }
+            Some((Request::Stop, client)) => {
+                board.say(operator::STOP);
+                client.done("the team is told to stop".to_owned());
+            }
+            Some((Request::Resume, client)) => {
+                board.say(operator::RESUME);
+                client.done("the team is told to go on".to_owned());
+            }
+            None => {}
         }
         let mut index = 0;
         while let Some(Pending { service, epoch, .. }) = self.pending.get(index) {

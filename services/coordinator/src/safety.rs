@@ -1,0 +1,303 @@
+//! When the team stops for safety's sake, and when it may go on.
+//!
+//! ```text
+//!              the operator, or something wrong with a robot
+//!   Going on ──────────────────────────────────────────────▶ Stopped { cause }
+//!      ▲                                                          │
+//!      └──────────── the operator, once nothing is wrong ─────────┘
+//! ```
+//!
+//! A stopped team is in one mode whatever it did before: the object's reference comes to rest within its limits
+//! of acceleration, feet take the steps that brings with it and then stand, and hands go on to do what they do.
+//! What went wrong first is remembered.
+
+use bytemuck::{Pod, Zeroable};
+use mikoshi_config::scenario::{OperatorWord, Safety as SafetyConfig, Scenario};
+use mikoshi_ipc_types::{MAX_ROBOTS, PoseWire, RobotState, all_hands, flag, operator, stop_cause};
+use mikoshi_spatial::{Hand, Pose, World};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+/// For how many ticks in a row something must be wrong: one wild reading is none. Less than the twenty ticks
+/// within which a team must react.
+const PATIENCE_TICKS: u64 = 5;
+
+/// What is watched. Immutable.
+#[derive(Clone, Debug)]
+pub(crate) struct Safety {
+    limits: SafetyConfig,
+    torque_ticks: u64,
+    /// What the scenario's operator says, by tick.
+    script: Vec<(u64, u64)>,
+}
+
+/// What is remembered between ticks.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SafetyState {
+    /// Why the team is stopped: one of [`stop_cause`]; 0 if it is not.
+    pub cause: u64,
+    /// Whose fault that is: the robot plus one.
+    pub robot: u64,
+    /// The operator's last word.
+    pub operator_word: u64,
+    /// For how many ticks each cause has been there, by robot.
+    lasted: [[u64; CAUSES]; MAX_ROBOTS],
+}
+
+/// Causes that a robot may give.
+const CAUSES: usize = stop_cause::ALL.len();
+
+// SAFETY: zeros are a valid value of integers.
+unsafe impl Zeroable for SafetyState {}
+// SAFETY: `repr(C)` over integers of one size only: no padding, any bit pattern valid.
+unsafe impl Pod for SafetyState {}
+
+impl Default for SafetyState {
+    fn default() -> Self {
+        Self { cause: 0, robot: 0, operator_word: 0, lasted: [[0; CAUSES]; MAX_ROBOTS] }
+    }
+}
+
+impl SafetyState {
+    /// Whether the team is stopped.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.cause != 0
+    }
+}
+
+impl Safety {
+    /// As the scenario has it.
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        let limits = scenario.safety.clone();
+        let say = |says| match says {
+            OperatorWord::Stop => operator::STOP,
+            OperatorWord::Resume => operator::RESUME,
+        };
+        let script = limits.operator.iter().map(|event| (scenario.tick_at(event.at_s), say(event.says)));
+        Self {
+            torque_ticks: scenario.tick_at(limits.torque_limit_s).max(1),
+            script: script.collect(),
+            limits,
+        }
+    }
+
+    /// One tick: what robots say of themselves, of which those with `hands` grasping hands shall hold the
+    /// object, or not; and what the operator has said last.
+    pub(crate) fn look<'a>(
+        &self,
+        state: &mut SafetyState,
+        tick: u64,
+        robots: impl Iterator<Item = (&'a RobotState, usize)>,
+        shall_hold: bool,
+        operator_word: u64,
+    ) {
+        let mut first = None;
+        for (index, ((robot, hands), lasted)) in robots.zip(&mut state.lasted).enumerate() {
+            for (cause, ticks) in stop_cause::ALL.into_iter().zip(lasted) {
+                *ticks =
+                    if self.is_wrong(cause, robot, hands, shall_hold) { ticks.saturating_add(1) } else { 0 };
+                let patience = if cause == stop_cause::TORQUE { self.torque_ticks } else { PATIENCE_TICKS };
+                if *ticks >= patience && first.is_none() {
+                    first = Some((cause, index as u64 + 1));
+                }
+            }
+        }
+        let heard = core::mem::replace(&mut state.operator_word, operator_word) != operator_word;
+        let said = heard.then(|| operator::command_of(operator_word));
+        let mut says =
+            self.script.iter().filter(|(at, _)| *at == tick).map(|(_, command)| *command).chain(said);
+        if first.is_none() && says.clone().any(|command| command == operator::STOP) {
+            first = Some((stop_cause::OPERATOR, 0));
+        }
+        match first {
+            Some((cause, robot)) if !state.is_stopped() => (state.cause, state.robot) = (cause, robot),
+            None if says.any(|command| command == operator::RESUME) => (state.cause, state.robot) = (0, 0),
+            _ => {}
+        }
+    }
+
+    fn is_wrong(&self, cause: u64, robot: &RobotState, hands: usize, shall_hold: bool) -> bool {
+        let limits = &self.limits;
+        match cause {
+            stop_cause::INPUT => robot.flags & flag::INPUT_REJECTED != 0,
+            stop_cause::HAND_WRENCH => robot.hand_wrench.iter().take(hands).any(|wrench| {
+                let [fx, fy, fz, nx, ny, nz] = *wrench;
+                Vector3::new(fx, fy, fz).norm() > limits.hand_force_max_n
+                    || Vector3::new(nx, ny, nz).norm() > limits.hand_moment_max_nm
+            }),
+            stop_cause::BALANCE => robot.zmp_margin_m < limits.zmp_margin_min_m,
+            stop_cause::TILT => tilt(robot) > limits.tilt_max_rad,
+            stop_cause::TORQUE => robot.flags & flag::TORQUE_LIMIT != 0,
+            stop_cause::GRASP => shall_hold && robot.holding_hands != all_hands(hands),
+            _ => false,
+        }
+    }
+}
+
+/// What no hand can apply, a thousand times what the largest carried object weighs: whoever says so is mistaken.
+const ABSURD_WRENCH: f64 = 1e4;
+/// How far a hand may come in a tick by its robot's word; forty metres a second are a mistake.
+const ABSURD_STEP_M: f64 = 0.2;
+
+/// Whether a robot may be believed that says `robot` and said `last` before; the first word is taken as it is.
+pub(crate) fn is_credible(robot: &RobotState, last: Option<&RobotState>, hands: usize) -> bool {
+    let poses = robot.hand_pose.iter().zip(&robot.hand_pose_commanded).take(hands);
+    let are_poses =
+        poses.flat_map(|(pose, commanded)| [pose, commanded]).all(is_pose) && is_pose(&robot.base_pose);
+    let is_step =
+        |(pose, before): (&PoseWire, &PoseWire)| (position(pose) - position(before)).norm() <= ABSURD_STEP_M;
+    let is_continuous =
+        last.is_none_or(|last| robot.hand_pose.iter().zip(&last.hand_pose).take(hands).all(is_step));
+    let wrenches = robot.hand_wrench.iter().take(hands).flatten();
+    are_poses && is_continuous && wrenches.fold(0.0, |most: f64, part| most.max(part.abs())) < ABSURD_WRENCH
+}
+
+fn is_pose(pose: &PoseWire) -> bool {
+    Pose::<World, Hand>::from_array(pose).is_some()
+}
+
+fn position(pose: &PoseWire) -> Vector3<f64> {
+    let [x, y, z, ..] = *pose;
+    Vector3::new(x, y, z)
+}
+
+/// Angle between a robot's base and upright.
+fn tilt(robot: &RobotState) -> f64 {
+    let [_, _, _, w, x, y, z] = robot.base_pose;
+    let up = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)) * Vector3::z();
+    up.z.clamp(-1.0, 1.0).acos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn safety() -> Safety {
+        let limits = SafetyConfig::default();
+        Safety { limits, torque_ticks: 100, script: vec![(50, operator::STOP), (60, operator::RESUME)] }
+    }
+
+    fn well() -> RobotState {
+        RobotState {
+            base_pose: [0.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0],
+            zmp_margin_m: 0.04,
+            holding_hands: 0b11,
+            ..RobotState::zeroed()
+        }
+    }
+
+    /// The first tick after which a team of two is stopped, if its second robot is as told from tick 10 on.
+    fn stopped_at(spoil: impl Fn(&mut RobotState)) -> Option<(u64, u64, u64)> {
+        let (safety, mut state) = (safety(), SafetyState::default());
+        (0..200).find_map(|tick| {
+            let mut robots = [well(), well()];
+            if tick >= 10 {
+                spoil(&mut robots[1]);
+            }
+            // Past what the script says.
+            safety.look(&mut state, 1000 + tick, robots.iter().map(|robot| (robot, 2)), true, 0);
+            state.is_stopped().then_some((tick, state.cause, state.robot))
+        })
+    }
+
+    #[test]
+    fn a_team_with_which_all_is_well_goes_on() {
+        assert_eq!(stopped_at(|_| ()), None);
+    }
+
+    #[test]
+    fn whatever_is_wrong_stops_the_team_within_twenty_ticks_and_is_named() {
+        let spoils: [(u64, fn(&mut RobotState)); 6] = [
+            (stop_cause::INPUT, |robot| robot.flags |= flag::INPUT_REJECTED),
+            (stop_cause::HAND_WRENCH, |robot| robot.hand_wrench[1][2] = -301.0),
+            (stop_cause::HAND_WRENCH, |robot| robot.hand_wrench[0][4] = 101.0),
+            (stop_cause::BALANCE, |robot| robot.zmp_margin_m = -0.001),
+            (stop_cause::TILT, |robot| robot.base_pose[3..].copy_from_slice(&[0.99, 0.14, 0.0, 0.0])),
+            (stop_cause::GRASP, |robot| robot.holding_hands = 0b01),
+        ];
+        for (cause, spoil) in spoils {
+            assert_eq!(stopped_at(spoil), Some((10 + PATIENCE_TICKS - 1, cause, 2)));
+        }
+        let torque = |robot: &mut RobotState| robot.flags |= flag::TORQUE_LIMIT;
+        assert_eq!(stopped_at(torque), Some((109, stop_cause::TORQUE, 2)));
+        const { assert!(PATIENCE_TICKS < 20) };
+    }
+
+    #[test]
+    fn a_wild_reading_is_nothing() {
+        let (safety, mut state) = (safety(), SafetyState::default());
+        for tick in 1000..2000 {
+            let mut robot = well();
+            if tick % PATIENCE_TICKS != 0 {
+                robot.zmp_margin_m = -1.0;
+            }
+            safety.look(&mut state, tick, core::iter::once((&robot, 2)), true, 0);
+            assert!(!state.is_stopped());
+        }
+    }
+
+    #[test]
+    fn the_operator_stops_the_team_and_lets_it_go_on_by_script_or_by_word() {
+        let (safety, mut state) = (safety(), SafetyState::default());
+        let mut look = |state: &mut SafetyState, tick, robot: &RobotState, word| {
+            safety.look(state, tick, core::iter::once((robot, 2)), true, word);
+            state.cause
+        };
+        for tick in 0..100 {
+            let is_stopped = (50..60).contains(&tick);
+            let expected = if is_stopped { stop_cause::OPERATOR } else { 0 };
+            assert_eq!(look(&mut state, tick, &well(), 0), expected, "tick {tick}");
+        }
+        let stop = operator::word_after(0, operator::STOP);
+        let resume = operator::word_after(stop, operator::RESUME);
+        assert_eq!(look(&mut state, 100, &well(), stop), stop_cause::OPERATOR);
+        assert_eq!(look(&mut state, 101, &well(), stop), stop_cause::OPERATOR);
+        assert_eq!(look(&mut state, 102, &well(), resume), 0);
+        assert_eq!(look(&mut state, 103, &well(), resume), 0, "a word is heard once");
+        assert_eq!(look(&mut state, 104, &well(), operator::word_after(resume, operator::STOP)), 1);
+    }
+
+    #[test]
+    fn nobody_goes_on_while_something_is_wrong() {
+        let (safety, mut state) = (safety(), SafetyState::default());
+        let fallen = RobotState { zmp_margin_m: -0.1, ..well() };
+        let mut word = 0;
+        for tick in 1000..1020 {
+            safety.look(&mut state, tick, core::iter::once((&fallen, 2)), true, word);
+            word = operator::word_after(word, operator::RESUME);
+        }
+        assert_eq!((state.cause, state.robot), (stop_cause::BALANCE, 1));
+        safety.look(&mut state, 1020, core::iter::once((&well(), 2)), true, word);
+        assert!(!state.is_stopped());
+    }
+
+    #[test]
+    fn a_hand_that_need_not_hold_may_be_open() {
+        let (safety, mut state) = (safety(), SafetyState::default());
+        let open = RobotState { holding_hands: 0, ..well() };
+        for tick in 1000..1020 {
+            safety.look(&mut state, tick, core::iter::once((&open, 2)), false, 0);
+        }
+        assert!(!state.is_stopped());
+    }
+
+    #[test]
+    fn nobody_is_believed_who_says_what_can_not_be() {
+        let upright = [0.3, 0.1, 0.8, 1.0, 0.0, 0.0, 0.0];
+        let last = RobotState { hand_pose: [upright; 4], hand_pose_commanded: [upright; 4], ..well() };
+        let is_believed = |spoil: fn(&mut RobotState)| {
+            let mut robot = last;
+            spoil(&mut robot);
+            is_credible(&robot, Some(&last), 2)
+        };
+        assert!(is_believed(|_| ()));
+        assert!(is_believed(|robot| robot.hand_pose[1][0] += 0.1));
+        assert!(is_believed(|robot| robot.hand_wrench[1][2] = -2000.0));
+        assert!(is_believed(|robot| robot.hand_pose[2] = [0.0; 7]), "it has two hands");
+        assert!(!is_believed(|robot| robot.hand_pose[1][0] += 0.3));
+        assert!(!is_believed(|robot| robot.hand_pose[0][3] = 3.0));
+        assert!(!is_believed(|robot| robot.hand_pose_commanded[0] = [0.0; 7]));
+        assert!(!is_believed(|robot| robot.base_pose = [0.0; 7]));
+        assert!(!is_believed(|robot| robot.hand_wrench[0][3] = 1e9));
+    }
+}
