@@ -55,9 +55,9 @@ impl<T: Transport> CoordinatorParticipant<T> {
             let last = (tick > 0).then_some(&*believed);
             match port.receive(tick, &mut self.arrived) {
                 Ok(()) if is_credible(&self.arrived.payload, last, hands) => *believed = self.arrived.payload,
-                // The last good one serves until the team has stopped.
+                // The last good one serves until the team has stopped; what it wished then it may not wish now.
                 Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => {
-                    believed.flags |= flag::INPUT_REJECTED
+                    believed.flags = flag::INPUT_REJECTED | flag::CAN_STOP | flag::READY_TO_STEP;
                 }
                 Ok(()) => return Err(TickError::Service("a robot says what can't be")),
                 Err(error) => return Err(error),

@@ -9,7 +9,8 @@
 //!
 //! A stopped team is in one mode whatever it did before: the object's reference comes to rest within its limits
 //! of acceleration, feet take the steps that brings with it and then stand, and hands go on to do what they do.
-//! What went wrong first is remembered.
+//! Where what is measured can't be believed any more, they do so without force control. What went wrong first is
+//! remembered.
 
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::scenario::{OperatorWord, Safety as SafetyConfig, Scenario};
@@ -62,6 +63,11 @@ impl SafetyState {
     /// Whether the team is stopped.
     pub(crate) fn is_stopped(&self) -> bool {
         self.cause != 0
+    }
+
+    /// Whether it is because what is measured can't be believed: then nothing may be controlled by it.
+    pub(crate) fn is_blind(&self) -> bool {
+        self.cause == stop_cause::INPUT
     }
 }
 

@@ -210,7 +210,9 @@ impl Coordinator {
         let is_stopped = safety.is_stopped();
         let is_free = self.job.is_in_the_air(&phase) && !self.presses;
         let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands, is_free)?;
-        let is_hybrid = mode::is_hybrid(phase.mode());
+        // Control ends with the first tick of doubt, and starts again after the last.
+        let is_blind = safety.is_blind() || state.safety.is_blind();
+        let is_hybrid = mode::is_hybrid(phase.mode()) && !is_blind;
         let motion_ticks = self.job.motion_ticks(&phase, tick);
         let is_moving = motion_ticks.zip(self.motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
         let speed_share = if is_moving && !is_stopped { wishes.speed_share } else { 0.0 };
@@ -244,6 +246,9 @@ impl Coordinator {
                 .and_then(|()| leading.advance_clocks(&mut state.leading, &self.timing, &wishes))
                 .ok_or(CoordinateError::State)?;
         }
+        if is_blind && mode::is_hybrid(phase.mode()) {
+            carry_hands(state, &mut law_output.hands, &X_WA_ref);
+        }
         (state.motion, state.clock, state.hand_wrench, state.safety) = (motion, clock, hand_wrench, safety);
         let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
         move_open_hands(state, &mut law_output.hands, hand_step_m);
@@ -253,7 +258,13 @@ impl Coordinator {
         write_team_state(state, &phase, law_output, reference, out);
         out.team_state.speed_share = speed_share;
 
-        if is_stopped {
+        if is_blind && !safety.is_blind() && mode::is_hybrid(phase.mode()) {
+            let X_WA = &law_output.position.external;
+            let path_time_s = state.motion.path_time_s;
+            state.motion = ObjectMotionState { path_time_s, ..ObjectMotionState::at_rest(X_WA) };
+            start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
+        }
+        if is_stopped || is_blind {
             state.phase = phase.delayed().to_words();
             return Ok(());
         }
@@ -440,6 +451,16 @@ fn move_open_hands(state: &mut CoordinatorState, references: &mut [HandReference
 /// The team's mode in a phase of its job.
 fn mode_of(state: &CoordinatorState, phase: &Phase) -> u64 {
     if state.safety.is_stopped() { mode::SAFE_STOP } else { phase.mode() }
+}
+
+/// Moves every hand's reference as the object's reference moves in this tick; it stays there.
+fn carry_hands(state: &mut CoordinatorState, references: &mut [HandReference], X_WA: &Pose<World, Object>) {
+    let Some(X_WA_before) = Pose::<World, Object>::from_array(&state.motion.pose) else { return };
+    let step: Pose<World, World> = *X_WA * X_WA_before.inverse();
+    for (reference, array) in references.iter_mut().zip(&mut state.hybrid.hand_pose_ref) {
+        reference.pose = step * reference.pose;
+        *array = reference.pose.to_array();
+    }
 }
 
 fn write_team_state(

@@ -16,6 +16,9 @@ use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+/// A foot that feels nothing stands on the ground when it is meant to be so low.
+const PLANNED_CONTACT_M: f64 = 0.002;
+
 /// Gait and stabiliser of one robot. Immutable.
 #[derive(Clone, Debug)]
 pub(crate) struct Legs {
@@ -172,13 +175,13 @@ impl Legs {
     }
 
     /// One tick: the feet follow the team's clock and the references of the hands that carry, the centre of
-    /// mass the feet, and the soles what is felt.
+    /// mass the feet, and the soles what is felt. A robot that feels nothing any more moves as planned.
     pub(crate) fn act(
         &self,
         state: &mut LegsState,
         clock: StepClock,
         hands: &[HandReference],
-        felt: &Felt,
+        felt: Option<&Felt>,
     ) -> LegTargets {
         self.place_feet(state, hands);
         // The centre of mass is planned for what the hands will carry. What they feel beside it is for the
@@ -187,7 +190,8 @@ impl Legs {
         let load = ExternalLoad::of_hands(&self.pendulum, 0.0, expected);
         let now = self.gait.reference(&state.gait);
         let stabilisation = self.stabiliser.as_ref().map(|stabiliser| {
-            let inputs = stabiliser_inputs(&now, felt);
+            let inputs =
+                felt.map_or_else(|| stabiliser_inputs_as_planned(&now), |felt| stabiliser_inputs(&now, felt));
             stabiliser.act(&mut state.stabiliser, &inputs)
         });
         let was_swinging = is_swinging(&state.gait);
@@ -196,7 +200,10 @@ impl Legs {
             &GaitInputs {
                 clock,
                 hand_centre: state.hand_centre,
-                foot_force: PerFoot::from_fn(|side| felt.ground_wrench[side].force.z),
+                foot_force: PerFoot::from_fn(|side| match felt {
+                    Some(felt) => felt.ground_wrench[side].force.z,
+                    None => self.foot_force_as_planned(&now.feet[side].pose),
+                }),
                 load,
             },
         );
@@ -240,19 +247,34 @@ impl Legs {
 
     /// What has sagged is lifted, and what has come to stand loses its correction; a foothold that is moved
     /// to where it belongs gains one, so that the sole stays where it is.
-    fn correct_soles(&self, state: &mut LegsState, now: &GaitReference, next: &GaitReference, felt: &Felt) {
+    fn correct_soles(
+        &self,
+        state: &mut LegsState,
+        now: &GaitReference,
+        next: &GaitReference,
+        felt: Option<&Felt>,
+    ) {
         for side in Side::BOTH {
             let (was, is) = (&now.feet[side], &next.feet[side]);
             let correction = &mut state.sole_correction[side];
-            if !is.in_contact {
-                let foot = was.pose.translation;
-                let (measured, commanded) = (&felt.base, &state.base_commanded);
-                self.sole_tracking.follow(correction, &foot, measured, commanded, self.period_s);
-            } else {
-                *correction += is.pose.displacement_to(&was.pose);
-                self.sole_tracking.fade(correction, self.period_s);
+            match felt {
+                Some(felt) if !is.in_contact => {
+                    let foot = was.pose.translation;
+                    let (measured, commanded) = (&felt.base, &state.base_commanded);
+                    self.sole_tracking.follow(correction, &foot, measured, commanded, self.period_s);
+                }
+                None if !is.in_contact => self.sole_tracking.fade(correction, self.period_s),
+                _ => {
+                    *correction += is.pose.displacement_to(&was.pose);
+                    self.sole_tracking.fade(correction, self.period_s);
+                }
             }
         }
+    }
+
+    /// What a foot bears that is where this reference has it: the ground comes where the plane is.
+    fn foot_force_as_planned(&self, foot: &Pose<World, Foot>) -> f64 {
+        if foot.translation.z <= PLANNED_CONTACT_M { self.pendulum.weight_n() } else { 0.0 }
     }
 
     fn shift_trust(&self, state: &mut LegsState) {
@@ -286,6 +308,20 @@ fn stabiliser_inputs(now: &GaitReference, felt: &Felt) -> StabiliserInputs {
         standing: PerFoot::from_fn(|side| now.feet[side].in_contact.then_some(now.feet[side].pose)),
         ground_wrench: felt.ground_wrench,
         load: felt.load,
+    }
+}
+
+/// As if all were as planned: what the stabiliser has done so far fades.
+fn stabiliser_inputs_as_planned(now: &GaitReference) -> StabiliserInputs {
+    StabiliserInputs {
+        com_ref: now.com.xy(),
+        com_velocity_ref: now.com_velocity.xy(),
+        com_acceleration_ref: now.com_acceleration.xy(),
+        com: now.com.xy(),
+        com_velocity: now.com_velocity.xy(),
+        standing: PerFoot { right: None, left: None },
+        ground_wrench: PerFoot { right: Wrench::zero(), left: Wrench::zero() },
+        load: ExternalLoad::NONE,
     }
 }
 

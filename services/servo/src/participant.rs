@@ -27,10 +27,8 @@ pub struct ServoParticipant<T: Transport> {
     state: ServoState,
     scratch: ServoScratch,
     coordination_delay_ticks: u64,
-    arrived_sensors: Frame<Sensors>,
-    arrived_command: Frame<TeamCommand>,
-    /// The last that could be used.
-    sensors: Sensors,
+    sensors: Frame<Sensors>,
+    arrived: Frame<TeamCommand>,
     /// The last that could be used.
     command: TeamCommand,
     /// 1 if the last command could not.
@@ -59,9 +57,8 @@ impl<T: Transport> ServoParticipant<T> {
             scratch: servo.scratch(),
             servo,
             coordination_delay_ticks: run.scenario.coordination_delay_ticks,
-            arrived_sensors: Frame::zeroed(),
-            arrived_command: Frame::zeroed(),
-            sensors: Sensors::zeroed(),
+            sensors: Frame::zeroed(),
+            arrived: Frame::zeroed(),
             command: TeamCommand::zeroed(),
             command_rejected: 0,
             robot_state: RobotState::zeroed(),
@@ -75,18 +72,22 @@ impl<T: Transport> ServoParticipant<T> {
 
     fn sense(&mut self, tick: u64) -> Result<(), TickError> {
         let mut rejected = core::mem::take(&mut self.command_rejected);
-        match self.sensor_port.receive(tick, &mut self.arrived_sensors) {
-            Ok(()) if self.servo.believes(&self.arrived_sensors.payload) => {
-                self.sensors = self.arrived_sensors.payload;
+        let received = self.sensor_port.receive(tick, &mut self.sensors);
+        let sensors = &self.sensors.payload;
+        match received {
+            Ok(()) if self.servo.believes(sensors) => {
+                rejected |= sensors.command_rejected;
+                self.robot_state = RobotState::zeroed();
+                self.servo.sense(&mut self.state, &mut self.scratch, sensors, &mut self.robot_state);
             }
-            // The last good ones serve until the team has stopped.
-            Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => rejected = 1,
+            Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => {
+                rejected = 1;
+                self.servo.sense_nothing(&mut self.state, &mut self.robot_state);
+            }
             Ok(()) => return Err(TickError::Service("the sensors say what can't be")),
             Err(error) => return Err(error),
         }
-        self.robot_state = RobotState::zeroed();
-        self.servo.sense(&mut self.state, &mut self.scratch, &self.sensors, &mut self.robot_state);
-        if rejected | self.sensors.command_rejected != 0 {
+        if rejected != 0 {
             self.robot_state.flags |= flag::INPUT_REJECTED;
         }
         Ok(())
@@ -97,9 +98,9 @@ impl<T: Transport> ServoParticipant<T> {
         let first = self.coordination_delay_ticks;
         let command = match tick.checked_sub(first) {
             Some(command_tick) => {
-                match self.command_port.receive(command_tick, &mut self.arrived_command) {
-                    Ok(()) if self.servo.accepts(&self.arrived_command.payload, &self.robot_state) => {
-                        self.command = self.arrived_command.payload;
+                match self.command_port.receive(command_tick, &mut self.arrived) {
+                    Ok(()) if self.servo.accepts(&self.arrived.payload, &self.robot_state) => {
+                        self.command = self.arrived.payload;
                     }
                     // Said in the next state.
                     Ok(()) | Err(TickError::NotFinite { .. }) if tick > first => self.command_rejected = 1,
@@ -116,12 +117,11 @@ impl<T: Transport> ServoParticipant<T> {
             .map_err(|error| TickError::Service(error.text()))
     }
 
-    /// What a checkpoint holds as it is: outputs, inputs that may serve again.
-    fn parts(&mut self) -> [&mut [u8]; 5] {
+    /// What a checkpoint holds as it is: outputs, and the command that may serve again.
+    fn parts(&mut self) -> [&mut [u8]; 4] {
         [
             bytemuck::bytes_of_mut(&mut self.robot_state),
             bytemuck::bytes_of_mut(&mut self.joint_command),
-            bytemuck::bytes_of_mut(&mut self.sensors),
             bytemuck::bytes_of_mut(&mut self.command),
             bytemuck::bytes_of_mut(&mut self.command_rejected),
         ]
@@ -151,18 +151,14 @@ impl<T: Transport> Participant for ServoParticipant<T> {
 }
 
 /// What a checkpoint begins with.
-const PLAIN_BYTES: usize = size_of::<RobotState>()
-    + size_of::<JointCommand>()
-    + size_of::<Sensors>()
-    + size_of::<TeamCommand>()
-    + size_of::<u64>();
+const PLAIN_BYTES: usize =
+    size_of::<RobotState>() + size_of::<JointCommand>() + size_of::<TeamCommand>() + size_of::<u64>();
 
 impl<T: Transport> Replaceable for ServoParticipant<T> {
     fn state_schema(&self) -> u64 {
         let parts = [
             RobotState::SCHEMA_HASH,
             JointCommand::SCHEMA_HASH,
-            Sensors::SCHEMA_HASH,
             TeamCommand::SCHEMA_HASH,
             self.servo.joint_count() as u64,
         ];

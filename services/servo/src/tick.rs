@@ -35,7 +35,7 @@ pub struct Servo {
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 2;
+pub(crate) const STATE_VERSION: u64 = 3;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,7 +43,8 @@ pub struct ServoState {
     ik: IkState,
     base: BaseEstimatorState,
     legs: LegsState,
-    felt: Felt,
+    /// What the robot feels; nothing while its sensors can't be believed.
+    felt: Option<Felt>,
     hand_pose_commanded: [PoseWire; MAX_HANDS],
     hand_error_max_m: f64,
     joint_margin_rad: f64,
@@ -100,13 +101,13 @@ impl Servo {
             ik: IkState::at_rest(&spec.initial_posture_rad),
             base: robot.base_estimator.start(&robot.model, &X_WB, &spec.initial_posture_rad),
             legs: legs_state,
-            felt: Felt {
+            felt: Some(Felt {
                 com: kinematics.com().xy(),
                 com_velocity: Vector2::zeros(),
                 base: X_WB,
                 ground_wrench: PerFoot { right: Wrench::zero(), left: Wrench::zero() },
                 load: ExternalLoad::NONE,
-            },
+            }),
             hand_pose_commanded,
             hand_error_max_m: 0.0,
             joint_margin_rad: mikoshi_humanoid::ik::joint_margin(&robot.model, &spec.initial_posture_rad),
@@ -154,24 +155,34 @@ impl Servo {
         let kinematics = &mut scratch.measured;
         let base = self.estimate_base(state, kinematics, sensors);
         let load = self.sense_hands(kinematics, sensors, out);
-        state.felt = self.sense_balance(&state.legs, kinematics, &base, load, sensors, out);
+        state.felt = Some(self.sense_balance(&state.legs, kinematics, &base, load, sensors, out));
+        out.base_pose = base.pose.to_array();
+        out.holding_hands = sensors.holding_hands;
 
-        let wish = self.legs.wish(&state.legs);
-        let is_behind = state.flags & flag::HANDS_BEHIND != 0;
         let torques = self.robot.model.joints().iter().zip(&sensors.joint_torque_nm);
         let is_at_limit =
             torques.into_iter().any(|(joint, torque)| torque.abs() >= FULL_TORQUE * joint.effort);
-        out.flags = state.flags
-            | set(flag::TORQUE_LIMIT, is_at_limit)
-            | wish_flags(&StepWish { ready: wish.ready && !is_behind, ..wish });
+        self.say_what_is_wished(state, out);
+        out.flags |= set(flag::TORQUE_LIMIT, is_at_limit);
+    }
+
+    /// A tick in which the sensors can't be believed: `out` is what was said last, and stays where nothing
+    /// better is known. The robot goes on as planned, without feedback.
+    pub(crate) fn sense_nothing(&self, state: &mut ServoState, out: &mut RobotState) {
+        state.felt = None;
+        self.say_what_is_wished(state, out);
+    }
+
+    fn say_what_is_wished(&self, state: &ServoState, out: &mut RobotState) {
+        let wish = self.legs.wish(&state.legs);
+        let is_behind = state.flags & flag::HANDS_BEHIND != 0;
+        out.flags = state.flags | wish_flags(&StepWish { ready: wish.ready && !is_behind, ..wish });
         out.step_urgency = wish.urgency;
         out.speed_share = self.legs.speed_share(&state.legs);
         out.steps = state.legs.steps;
         out.hand_pose_commanded = state.hand_pose_commanded;
-        out.base_pose = base.pose.to_array();
         out.joint_margin_min_rad = state.joint_margin_rad;
         out.hand_error_max_m = state.hand_error_max_m;
-        out.holding_hands = sensors.holding_hands;
     }
 
     fn estimate_base(
@@ -260,7 +271,7 @@ impl Servo {
         if let Some(command) = command.filter(|command| command.team_mode != mode::HOLD) {
             // The state changes only when nothing can fail any more.
             let (mut legs, mut ik) = (state.legs, state.ik);
-            let targets = self.targets(&mut legs, &state.felt, command)?;
+            let targets = self.targets(&mut legs, state.felt.as_ref(), command)?;
             let report = self
                 .robot
                 .ik
@@ -280,7 +291,7 @@ impl Servo {
     fn targets(
         &self,
         legs: &mut LegsState,
-        felt: &Felt,
+        felt: Option<&Felt>,
         command: &TeamCommand,
     ) -> Result<IkTargets, ServoError> {
         let clock = StepClock::from_words(command.step_clock).ok_or(ServoError::StepClock)?;

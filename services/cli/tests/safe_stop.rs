@@ -1,0 +1,217 @@
+//! Services that say what can't be, while the team walks: it stops within twenty ticks, nobody falls, and the
+//! object stays in its hands.
+
+use mikoshi_config::{RunSpec, load_scenario};
+use mikoshi_coordinator::CoordinatorParticipant;
+use mikoshi_ipc_types::{
+    JointCommand, Payload, RobotState, Sensors, ServiceId, ServicePayload, TeamCommand, stop_cause,
+};
+use mikoshi_observation::{Observation, TeamTap};
+use mikoshi_resolution::{resolve, tick_schedule};
+use mikoshi_runtime::{
+    ConnectError, InMemoryHub, InMemoryTransport, Loan, OperatorPort, Participant, Publisher, TickError,
+    Topic, Transport, run_in_one_thread,
+};
+use mikoshi_servo::ServoParticipant;
+use mikoshi_sim_bridge::BridgeParticipant;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::rc::Rc;
+
+/// What a double says in place of what it should: the frame's topic and tick, and its payload.
+type Spoil = Rc<dyn Fn(Topic, u64, &mut [u8])>;
+
+/// The ports of a double.
+#[derive(Clone)]
+struct Spoilt {
+    inner: InMemoryTransport,
+    spoil: Spoil,
+}
+
+struct SpoiltPublisher<P: Payload> {
+    inner: <InMemoryTransport as Transport>::Publisher<P>,
+    topic: Topic,
+    spoil: Spoil,
+}
+
+struct SpoiltLoan<'a, P: Payload> {
+    inner: <<InMemoryTransport as Transport>::Publisher<P> as Publisher<P>>::Loan<'a>,
+    topic: Topic,
+    tick: u64,
+    spoil: &'a Spoil,
+}
+
+impl Transport for Spoilt {
+    type Publisher<P: Payload> = SpoiltPublisher<P>;
+    type Subscriber<P: ServicePayload> = <InMemoryTransport as Transport>::Subscriber<P>;
+
+    fn publisher<P: Payload>(&self, robot: usize) -> Result<SpoiltPublisher<P>, ConnectError> {
+        let (topic, spoil) = (Topic::of::<P>(robot), Rc::clone(&self.spoil));
+        Ok(SpoiltPublisher { inner: self.inner.publisher(robot)?, topic, spoil })
+    }
+
+    fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<Self::Subscriber<P>, ConnectError> {
+        self.inner.subscriber(robot)
+    }
+
+    fn operator(&self) -> OperatorPort {
+        self.inner.operator()
+    }
+}
+
+impl<P: Payload> Publisher<P> for SpoiltPublisher<P> {
+    type Loan<'a> = SpoiltLoan<'a, P>;
+
+    fn loan(&mut self, tick: u64) -> Result<SpoiltLoan<'_, P>, TickError> {
+        let Self { inner, topic, spoil } = self;
+        Ok(SpoiltLoan { inner: inner.loan(tick)?, topic: *topic, tick, spoil })
+    }
+}
+
+impl<P: Payload> Loan<P> for SpoiltLoan<'_, P> {
+    fn payload_mut(&mut self) -> &mut P {
+        self.inner.payload_mut()
+    }
+
+    fn send(mut self) -> Result<(), TickError> {
+        (self.spoil)(self.topic, self.tick, bytemuck::bytes_of_mut(self.inner.payload_mut()));
+        self.inner.send()
+    }
+}
+
+fn walk() -> RunSpec {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/transport.toml");
+    let overrides = [
+        ("duration_s", "9.0"),
+        ("motion.start_s", "1.5"),
+        ("motion.random.duration_s", "6.0"),
+        ("motion.random.travel_m", "[0.3, 0.05, 0.0]"),
+        ("motion.random.travel_rad", "[0.0, 0.0, 0.05]"),
+    ];
+    let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    resolve(&load_scenario(&scenario, &overrides, None).expect("a scenario")).expect("a run")
+}
+
+fn participant(run: &RunSpec, service: ServiceId, ports: &Spoilt) -> Box<dyn Participant> {
+    match service {
+        ServiceId::Bridge => Box::new(BridgeParticipant::new(run, ports).expect("a bridge")),
+        ServiceId::Coordinator => Box::new(CoordinatorParticipant::new(run, ports).expect("a coordinator")),
+        ServiceId::Servo(robot) => Box::new(ServoParticipant::new(run, robot, ports).expect("a servo")),
+    }
+}
+
+/// What became of a team one of whose services says something else from a tick on.
+#[derive(Debug, Default)]
+struct Fate {
+    /// First tick of the safe stop, its cause, and whose fault it is.
+    stop: Option<(u64, u64, u64)>,
+    fell: u64,
+    /// How far the object has come down.
+    sunk_m: f64,
+    /// Its speed in the end.
+    speed_end_m_s: f64,
+    margin_min_m: f64,
+}
+
+fn fate(spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
+    let run = walk();
+    let schedule = tick_schedule(&run).expect("a schedule");
+    let (hub, spoil): (_, Spoil) = (InMemoryHub::new(schedule.clone()), Rc::new(spoil));
+    let services = schedule.services().into_iter();
+    let mut participants: Vec<_> = services
+        .map(|id| participant(&run, id, &Spoilt { inner: hub.transport(id), spoil: Rc::clone(&spoil) }))
+        .collect();
+    let mut tap = TeamTap::new(&hub.tap(), run.robots.len()).expect("a tap");
+    let mut seen = Observation::for_team(run.robots.len());
+    let mut fate = Fate { margin_min_m: f64::INFINITY, ..Fate::default() };
+    let mut height_m = None;
+    let ended = run_in_one_thread(&schedule, &mut participants, run.ticks, |tick| {
+        assert_eq!(tap.try_take_tick(&mut seen), Ok(true));
+        let team = &seen.team_state.payload;
+        if team.stop_cause != 0 {
+            fate.stop.get_or_insert((tick, team.stop_cause, team.stop_robot));
+        }
+        let object = &seen.object_truth.payload;
+        let first_m = *height_m.get_or_insert(object.pose[2]);
+        fate.sunk_m = fate.sunk_m.max(first_m - object.pose[2]);
+        fate.speed_end_m_s = object.twist[..3].iter().map(|v| v * v).sum::<f64>().sqrt();
+        for robot in &seen.robot_truth {
+            fate.fell |= robot.payload.fallen;
+            fate.margin_min_m = fate.margin_min_m.min(robot.payload.zmp_margin_m);
+        }
+        ControlFlow::Continue(())
+    });
+    assert_eq!(ended, Ok(run.ticks), "{fate:?}");
+    fate
+}
+
+/// Puts a value in one number of a robot's payloads from a tick on.
+fn put<P: Payload>(robot: usize, from: u64, field: &'static str, index: usize, value: f64) -> Fate {
+    let field = P::FIELDS.iter().find(|found| found.name == field).expect("it has it");
+    let at = field.offset_bytes + index * size_of::<f64>();
+    fate(move |topic, tick, payload| {
+        if topic == Topic::of::<P>(robot) && tick >= from {
+            payload[at..at + size_of::<f64>()].copy_from_slice(&value.to_ne_bytes());
+        }
+    })
+}
+
+/// In it the team walks: one foot of every robot is in the air.
+const WALKING: u64 = 700;
+/// Before it, and after the law has started, all stand.
+const STANDING: u64 = 250;
+
+#[track_caller]
+fn expect_safe_stop(fate: &Fate, from: u64, cause: u64, robot: usize) {
+    let (tick, found, of) = fate.stop.expect("the team has stopped");
+    assert!((from..from + 20).contains(&tick), "{fate:?}");
+    assert_eq!((found, of), (cause, robot as u64 + 1), "{fate:?}");
+    assert_eq!(fate.fell, 0, "{fate:?}");
+    assert!(fate.sunk_m < 0.02, "{fate:?}");
+    assert!(fate.speed_end_m_s < 0.005, "{fate:?}");
+}
+
+#[test]
+fn a_team_in_which_all_is_well_does_not_stop() {
+    let fate = fate(|_, _, _| ());
+    assert_eq!((fate.stop, fate.fell), (None, 0), "{fate:?}");
+    assert!(fate.margin_min_m > 0.025, "{fate:?}");
+}
+
+#[test]
+fn sensors_that_are_not_finite_stop_the_team() {
+    for (from, robot) in [(STANDING, 0), (WALKING, 2)] {
+        let fate = put::<Sensors>(robot, from, "joint_position_rad", 3, f64::NAN);
+        expect_safe_stop(&fate, from, stop_cause::INPUT, robot);
+    }
+}
+
+#[test]
+fn sensors_that_say_what_can_not_be_stop_the_team() {
+    let fate = put::<Sensors>(1, WALKING, "imu_angular_velocity_rad_s", 0, 1e6);
+    expect_safe_stop(&fate, WALKING, stop_cause::INPUT, 1);
+}
+
+#[test]
+fn a_servo_that_sends_what_is_not_finite_or_a_huge_force_stops_the_team() {
+    for value in [f64::NAN, f64::INFINITY, 1e9] {
+        let fate = put::<RobotState>(3, WALKING, "hand_wrench", 1, value);
+        expect_safe_stop(&fate, WALKING, stop_cause::INPUT, 3);
+    }
+}
+
+#[test]
+fn a_coordinator_that_sends_what_is_not_finite_or_out_of_reach_stops_the_team() {
+    for value in [f64::NAN, 50.0] {
+        let fate = put::<TeamCommand>(0, STANDING, "hand_pose_ref", 0, value);
+        expect_safe_stop(&fate, STANDING, stop_cause::INPUT, 0);
+    }
+}
+
+#[test]
+fn joint_commands_that_no_drive_can_follow_stop_the_team() {
+    for value in [f64::NAN, 100.0] {
+        let fate = put::<JointCommand>(2, STANDING, "joint_position_ref_rad", 3, value);
+        expect_safe_stop(&fate, STANDING, stop_cause::INPUT, 2);
+    }
+}
