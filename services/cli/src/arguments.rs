@@ -58,6 +58,21 @@ Exit status:
   2  it was refused, and nothing has changed: no such service, a setting that is wrong, or another state
   3  a fault of the system";
 
+const SOAK_EXAMPLES: &str = "\
+Examples:
+  mikoshi soak config/scenarios/transport.toml                 (200 kills)
+  mikoshi soak config/scenarios/transport.toml --seed 3 --kills 20 --out /tmp/soak
+  mikoshi soak config/scenarios/hour.toml --kills 0            (memory, falls)
+
+The run is carried out undisturbed in one thread, and then in processes of which some are killed at ticks drawn
+by seed, alone, in pairs, and twice in a row. Both must leave the same log, byte for byte, and nothing else.
+
+Exit status:
+  0  they do, and the run met its thresholds
+  1  they do not, or it did not
+  2  bad usage or configuration
+  3  a fault of the system";
+
 const REPORT_EXAMPLES: &str = "\
 Examples:
   mikoshi report runs/hold-0                  (runs/hold-0/report/index.html)
@@ -108,6 +123,9 @@ pub enum Command {
     Stop(OperatorArguments),
     /// Let the team go on after a stop, once nothing is wrong
     Resume(OperatorArguments),
+    /// Kill processes of a run at random, and compare it with the same run undisturbed
+    #[command(after_help = SOAK_EXAMPLES)]
+    Soak(SoakArguments),
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
@@ -153,6 +171,9 @@ pub struct RunArguments {
     /// No progress and no table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
+    /// Record no frames: run.mcap takes 2.6 MB for each second of four robots
+    #[arg(long)]
+    pub no_log: bool,
 }
 
 /// `mikoshi replay`.
@@ -194,6 +215,23 @@ pub struct OperatorArguments {
     /// The run, as `mikoshi status` names it [default: the only one]
     #[arg(long, value_name = "RUN")]
     pub run: Option<String>,
+}
+
+/// `mikoshi soak`.
+#[derive(Args, Debug)]
+pub struct SoakArguments {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub scenario: ScenarioArguments,
+    /// How often somebody is killed; some strikes hit two, or successors too
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    pub kills: usize,
+    /// Where the results go [default: runs/soak-NAME-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// No table: errors and exit status only
+    #[arg(long, short)]
+    pub quiet: bool,
 }
 
 /// `mikoshi report`.

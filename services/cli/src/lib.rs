@@ -28,6 +28,7 @@ pub mod replay;
 mod report;
 mod requests;
 mod revise;
+mod soak;
 mod standstill;
 mod succession;
 mod supervisor;
@@ -53,6 +54,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Swap(arguments) => commands::swap::swap(arguments).map(|()| Status::Met),
         Command::Stop(arguments) => commands::operator::stop(arguments).map(|()| Status::Met),
         Command::Resume(arguments) => commands::operator::resume(arguments).map(|()| Status::Met),
+        Command::Soak(arguments) => soak::soak(arguments),
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),

@@ -1,5 +1,6 @@
 //! Watches a run tick by tick, and says at the end what it came to.
 
+use crate::arguments::RunArguments;
 use crate::failure::{Failure, as_lines};
 use crate::judge;
 use crate::observed_run::observed_run;
@@ -19,7 +20,7 @@ use mikoshi_observation::{
 pub struct RunObserver {
     figures: Figures,
     hash: LogHash,
-    log: LogWriter,
+    log: Option<LogWriter>,
     progress: Progress,
     stamps: Stamps,
     swaps: Vec<Swap>,
@@ -33,13 +34,18 @@ impl RunObserver {
     ///
     /// # Errors
     /// The log can't be written: [`Status::Fault`](crate::failure::Status::Fault).
-    pub fn new(prepared: &Prepared, out: &OutputDirectory, is_shown: bool) -> Result<Self, Failure> {
+    pub fn new(
+        prepared: &Prepared,
+        arguments: &RunArguments,
+        out: &OutputDirectory,
+    ) -> Result<Self, Failure> {
         let run = &prepared.run;
+        let log = (!arguments.no_log).then(|| LogWriter::create(&out.run_log(), run));
         Ok(Self {
             figures: Figures::new(observed_run(run, prepared.law.internal_forces())?),
             hash: LogHash::default(),
-            log: LogWriter::create(&out.run_log(), run).map_err(Failure::fault)?,
-            progress: Progress::new(run.ticks, run.scenario.control_period_s, is_shown),
+            log: log.transpose().map_err(Failure::fault)?,
+            progress: Progress::new(run.ticks, run.scenario.control_period_s, !arguments.quiet),
             stamps: Stamps::default(),
             swaps: vec![],
             stops: Stops::of(run),
@@ -56,7 +62,9 @@ impl RunObserver {
         self.hash.observe(observation);
         self.figures.observe(observation);
         self.stamps.observe(observation.object_truth.envelope.stamp_ns);
-        self.log.write(observation)?;
+        if let Some(log) = &mut self.log {
+            log.write(observation)?;
+        }
         self.stops.observe(observation.tick(), &observation.team_state.payload);
         self.ticks += 1;
         self.progress.set_ticks(self.ticks);
@@ -71,8 +79,8 @@ impl RunObserver {
     /// Keeps the description of the run that a service has from a swap on, if it is another. What the log
     /// can't take now it will not take later either, and says so then.
     pub fn note_revision(&mut self, swap: &Swap, service: ServiceId, revised: Option<&RunSpec>) {
-        if let Some(run) = revised {
-            let _ = self.log.write_revision(swap.tick, service, run);
+        if let (Some(log), Some(run)) = (&mut self.log, revised) {
+            let _ = log.write_revision(swap.tick, service, run);
         }
     }
 
@@ -88,7 +96,9 @@ impl RunObserver {
     pub fn finish(self, run: &RunSpec, faults: Vec<Fault>) -> Result<Summary, Failure> {
         let wall_time_s = self.clock.elapsed().as_secs_f64();
         self.progress.clear();
-        self.log.finish().map_err(Failure::fault)?;
+        if let Some(log) = self.log {
+            log.finish().map_err(Failure::fault)?;
+        }
         let (figures, scenario) = (self.figures.finish(), &run.scenario);
         let sim_time_s = self.ticks as f64 * scenario.control_period_s;
         let mut summary = Summary {

@@ -33,7 +33,7 @@ pub fn run(
     };
     save_scenario(&prepared.run, &out.scenario()).map_err(Failure::fault)?;
 
-    let mut observer = RunObserver::new(&prepared, &out, !arguments.quiet)?;
+    let mut observer = RunObserver::new(&prepared, arguments, &out)?;
     let outcome = match execute(&prepared, &out, &mut observer) {
         Ok(outcome) => outcome,
         Err(failure) => {
