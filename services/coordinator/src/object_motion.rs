@@ -1,11 +1,18 @@
 //! The object's reference motion: the operator's velocities, bounded by what the slowest robot can follow
 //! (Fig. 10b) and by accelerations, and their integral.
 
+use crate::step_clock::step_timing;
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_config::scenario::Segment;
 use mikoshi_spatial::{Object, Pose, Twist, World};
 use nalgebra::Vector3;
+
+/// How far the object may go before a first foot comes down: hands go ahead of feet that stand, as far as they
+/// may be ahead of a robot that walks before the object slows down for it.
+const START_ROOM_M: f64 = 0.08;
+/// The same of its turn.
+const START_ROOM_RAD: f64 = 0.12;
 
 /// The operator's velocities over time.
 #[derive(Clone, Debug)]
@@ -16,6 +23,10 @@ pub(crate) struct ObjectMotion {
     step_m_s: f64,
     /// The same of angular velocity \[rad/s\].
     step_rad_s: f64,
+    /// Largest gain of velocity in a tick before a first foot has come down \[m/s\].
+    start_step_m_s: f64,
+    /// The same of angular velocity \[rad/s\].
+    start_step_rad_s: f64,
 }
 
 /// Where the reference is, and how fast.
@@ -52,35 +63,52 @@ impl ObjectMotion {
     pub(crate) fn new(run: &RunSpec) -> Self {
         let period_s = run.scenario.control_period_s;
         let accelerations = run.scenario.motion.as_ref();
+        let first_landing_s = step_timing(&run.scenario).step(0) as f64 * period_s;
         let step =
             |of: fn(&mikoshi_config::scenario::Motion) -> f64| accelerations.map_or(0.0, of) * period_s;
+        let (step_m_s, step_rad_s) =
+            (step(|motion| motion.acceleration_m_s2), step(|motion| motion.angular_acceleration_rad_s2));
+        let to_go = |room: f64| 2.0 * room / (first_landing_s * first_landing_s) * period_s;
         Self {
             segments: run.motion.clone(),
             period_s,
-            step_m_s: step(|motion| motion.acceleration_m_s2),
-            step_rad_s: step(|motion| motion.angular_acceleration_rad_s2),
+            step_m_s,
+            step_rad_s,
+            start_step_m_s: step_m_s.min(to_go(START_ROOM_M)),
+            start_step_rad_s: step_rad_s.min(to_go(START_ROOM_RAD)),
         }
     }
 
-    /// One tick: the twist goes towards `speed_share` of the operator's, and the pose with it. Returns
-    /// the reference pose at the end of the tick; `None` if the state is no pose.
+    /// One tick: the twist goes towards `speed_share` of the operator's, and the pose with it; gently as long
+    /// as feet don't follow. Returns the reference pose at the end of the tick; `None` if the state is no pose.
     pub(crate) fn advance(
         &self,
         state: &mut ObjectMotionState,
         speed_share: f64,
+        feet_follow: bool,
     ) -> Option<Pose<World, Object>> {
         let X_WA = Pose::<World, Object>::from_array(&state.pose)?;
         let wanted = self.velocity_at(state.path_time_s);
         let last = state.twist();
-        let twist = Twist::new(
-            towards(&last.linear, &(wanted.linear * speed_share), self.step_m_s),
-            towards(&last.angular, &(wanted.angular * speed_share), self.step_rad_s),
+        let start = |step: f64, start: f64| if feet_follow { step } else { start };
+        let (linear, pace) = change(
+            &last.linear,
+            &(wanted.linear * speed_share),
+            self.step_m_s,
+            start(self.step_m_s, self.start_step_m_s),
         );
+        let (angular, turning_pace) = change(
+            &last.angular,
+            &(wanted.angular * speed_share),
+            self.step_rad_s,
+            start(self.step_rad_s, self.start_step_rad_s),
+        );
+        let twist = Twist::new(linear, angular);
         let X_WA = X_WA.displaced(&(twist * self.period_s));
         *state = ObjectMotionState {
             pose: X_WA.to_array(),
             twist: twist.to_array(),
-            path_time_s: state.path_time_s + self.period_s * speed_share,
+            path_time_s: state.path_time_s + self.period_s * speed_share * pace.min(turning_pace),
         };
         Some(X_WA)
     }
@@ -112,6 +140,18 @@ impl ObjectMotion {
     }
 }
 
+/// The velocity after a tick in which it may change by `step`, and gain only `gain`; and at which pace the way
+/// goes on. What is lost while speed is gained at the rate a, v² / 2a, is gained again where it is lost, if
+/// that takes as long; if a gain takes longer, by 1 / a' − 1 / a of v, the way waits for half of that.
+fn change(from: &Vector3<f64>, target: &Vector3<f64>, step: f64, gain: f64) -> (Vector3<f64>, f64) {
+    if target.norm() <= from.norm() {
+        return (towards(from, target, step), 1.0);
+    }
+    let next = towards(from, target, gain);
+    let pace = if next == *target { 1.0 } else { 0.5 * (1.0 + gain / step) };
+    (next, pace)
+}
+
 /// `target`, or as far towards it as one step goes.
 fn towards(from: &Vector3<f64>, target: &Vector3<f64>, step: f64) -> Vector3<f64> {
     let way = target - from;
@@ -133,6 +173,8 @@ mod tests {
             period_s: 0.005,
             step_m_s: MOTION_STEP,
             step_rad_s: MOTION_STEP,
+            start_step_m_s: 0.1 * MOTION_STEP,
+            start_step_rad_s: 0.1 * MOTION_STEP,
         }
     }
 
@@ -140,7 +182,7 @@ mod tests {
         let (motion, mut state) = (motion(), ObjectMotionState::at_rest(&Pose::identity()));
         for _ in 0..ticks {
             let last = state.twist();
-            motion.advance(&mut state, speed_share).expect("a pose");
+            motion.advance(&mut state, speed_share, true).expect("a pose");
             assert!((state.twist().linear - last.linear).norm() <= MOTION_STEP * (1.0 + 1e-9));
         }
         state
@@ -171,6 +213,19 @@ mod tests {
         }
         assert!((state.pose[2] - 0.01).abs() < 1e-12 && state.pose[..2] == [0.0; 2]);
         assert!((state.twist[2] - 0.2).abs() < 1e-12 && state.path_time_s == 0.0);
+    }
+
+    #[test]
+    fn before_a_foot_has_landed_the_object_gains_speed_slowly_and_still_goes_where_its_velocities_lead() {
+        let (motion, mut state) = (motion(), ObjectMotionState::at_rest(&Pose::identity()));
+        for tick in 1..=1000 {
+            motion.advance(&mut state, 1.0, tick > 420).expect("a pose");
+            if tick == 100 {
+                assert!((state.twist[0] - 100.0 * motion.start_step_m_s).abs() < 1e-12, "{:?}", state.twist);
+            }
+        }
+        assert_eq!(state.twist, [0.0; 6]);
+        assert!((state.pose[0] - 0.2).abs() < 2e-3, "{:?}", state.pose);
     }
 
     #[test]

@@ -78,6 +78,11 @@ impl TeamClockState {
         self.clock == StepClock::Standing.to_words()
     }
 
+    /// Whether a walk goes on that has brought a foot down: before, feet are where it found them.
+    pub(crate) fn has_landed(&self) -> bool {
+        matches!(StepClock::from_words(self.clock), Some(StepClock::Stepping { step_index: 1.., .. }))
+    }
+
     /// The next tick; `None` if the state is no clock.
     pub(crate) fn advance(&self, timing: &StepTiming, wishes: &Wishes, may_walk: bool) -> Option<Self> {
         let clock = TeamClock { clock: StepClock::from_words(self.clock)?, waited: self.waited };

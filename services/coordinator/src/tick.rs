@@ -221,7 +221,11 @@ impl Coordinator {
         let X_WA_ref = match self.job.object_step_m(&phase, tick) {
             Some(_) if is_stopped => self.motion.lift(&mut motion, 0.0),
             Some(step_m) => self.motion.lift(&mut motion, step_m),
-            None => self.motion.advance(&mut motion, speed_share),
+            // What the paper compares with, a leader, does not wait for anybody's feet.
+            None => {
+                let feet_follow = self.leading.is_some() || state.clock.has_landed();
+                self.motion.advance(&mut motion, speed_share, feet_follow)
+            }
         };
         let X_WA_ref = X_WA_ref.ok_or(CoordinateError::State)?;
         let may_walk = phase.mode() == mode::CARRY;

@@ -11,3 +11,4 @@ mod replay;
 mod report;
 mod succession;
 mod sweep;
+mod walking;
