@@ -14,6 +14,9 @@ use mikoshi_runtime::{
 };
 use mikoshi_servo::ServoParticipant;
 use mikoshi_sim_bridge::BridgeParticipant;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::rc::Rc;
@@ -79,9 +82,11 @@ impl<P: Payload> Loan<P> for SpoiltLoan<'_, P> {
     }
 }
 
-fn walk() -> RunSpec {
+/// A walk in which the operator says what `operator` says.
+fn walk(operator: &str) -> RunSpec {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/transport.toml");
     let overrides = [
+        ("safety.operator", operator),
         ("duration_s", "9.0"),
         ("motion.start_s", "1.5"),
         ("motion.random.duration_s", "6.0"),
@@ -105,6 +110,7 @@ fn participant(run: &RunSpec, service: ServiceId, ports: &Spoilt) -> Box<dyn Par
 struct Fate {
     /// First tick of the safe stop, its cause, and whose fault it is.
     stop: Option<(u64, u64, u64)>,
+    ticks_stopped: u64,
     fell: u64,
     /// How far the object has come down.
     sunk_m: f64,
@@ -114,12 +120,15 @@ struct Fate {
 }
 
 fn fate(spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
-    let run = walk();
-    let schedule = tick_schedule(&run).expect("a schedule");
+    fate_of(&walk("[]"), spoil)
+}
+
+fn fate_of(run: &RunSpec, spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
+    let schedule = tick_schedule(run).expect("a schedule");
     let (hub, spoil): (_, Spoil) = (InMemoryHub::new(schedule.clone()), Rc::new(spoil));
     let services = schedule.services().into_iter();
     let mut participants: Vec<_> = services
-        .map(|id| participant(&run, id, &Spoilt { inner: hub.transport(id), spoil: Rc::clone(&spoil) }))
+        .map(|id| participant(run, id, &Spoilt { inner: hub.transport(id), spoil: Rc::clone(&spoil) }))
         .collect();
     let mut tap = TeamTap::new(&hub.tap(), run.robots.len()).expect("a tap");
     let mut seen = Observation::for_team(run.robots.len());
@@ -130,6 +139,7 @@ fn fate(spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
         let team = &seen.team_state.payload;
         if team.stop_cause != 0 {
             fate.stop.get_or_insert((tick, team.stop_cause, team.stop_robot));
+            fate.ticks_stopped += 1;
         }
         let object = &seen.object_truth.payload;
         let first_m = *height_m.get_or_insert(object.pose[2]);
@@ -213,5 +223,44 @@ fn joint_commands_that_no_drive_can_follow_stop_the_team() {
     for value in [f64::NAN, 100.0] {
         let fate = put::<JointCommand>(2, STANDING, "joint_position_ref_rad", 3, value);
         expect_safe_stop(&fate, STANDING, stop_cause::INPUT, 2);
+    }
+}
+
+#[test]
+fn a_team_whose_sensors_recover_goes_on_when_the_operator_says_so_and_not_before() {
+    let run = walk("[{ at_s = 3.6, says = \"resume\" }, { at_s = 5.0, says = \"resume\" }]");
+    let at = Sensors::FIELDS.iter().find(|field| field.name == "imu_specific_force_m_s2").expect("it has it");
+    let at = at.offset_bytes;
+    let fate = fate_of(&run, move |topic, tick, payload| {
+        if topic == Topic::of::<Sensors>(1) && (WALKING..WALKING + 100).contains(&tick) {
+            payload[at..at + size_of::<f64>()].copy_from_slice(&f64::NAN.to_ne_bytes());
+        }
+    });
+    assert_eq!(fate.stop.map(|(_, cause, robot)| (cause, robot)), Some((stop_cause::INPUT, 2)), "{fate:?}");
+    // From the fifth bad reading on, to five seconds: at 3.6 s it is too early.
+    assert_eq!(fate.ticks_stopped, 1000 - (WALKING + 4), "{fate:?}");
+    assert!(fate.fell == 0 && fate.sunk_m < 0.02, "{fate:?}");
+}
+
+#[test]
+fn whatever_services_say_nobody_panics_and_the_world_stays_a_world() {
+    for seed in 0..4 {
+        let random = RefCell::new(Pcg64::seed_from_u64(seed));
+        let wild = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300, -1e300, 1e-310, 0.0, -0.0, 1e9, 7.0];
+        fate(move |_, tick, payload| {
+            let mut random = random.borrow_mut();
+            // One frame in twenty, in up to three of its words: by a wild number, or by a flipped bit.
+            if tick < 20 || !random.random_bool(0.05) {
+                return;
+            }
+            for _ in 0..random.random_range(1..4) {
+                let word = random.random_range(0..payload.len() / 8);
+                let bytes = &mut payload[8 * word..8 * word + 8];
+                match random.random_bool(0.5) {
+                    true => bytes.copy_from_slice(&wild[random.random_range(0..wild.len())].to_ne_bytes()),
+                    false => bytes[random.random_range(0..8)] ^= 1 << random.random_range(0..8),
+                }
+            }
+        });
     }
 }

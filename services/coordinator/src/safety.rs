@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn the_operator_stops_the_team_and_lets_it_go_on_by_script_or_by_word() {
         let (safety, mut state) = (safety(), SafetyState::default());
-        let mut look = |state: &mut SafetyState, tick, robot: &RobotState, word| {
+        let look = |state: &mut SafetyState, tick, robot: &RobotState, word| {
             safety.look(state, tick, core::iter::once((robot, 2)), true, word);
             state.cause
         };

@@ -35,6 +35,8 @@ fn robots(run: &RunSpec, tick: u64) -> Vec<RobotState> {
     let X_WA = Pose::<World, Object>::new(Vector3::from(object.position_m), UnitQuaternion::identity());
     let state = |(index, robot): (usize, &mikoshi_config::RobotSpec)| {
         let mut state = RobotState::zeroed();
+        state.base_pose[3] = 1.0;
+        state.zmp_margin_m = 0.05;
         state.holding_hands = all_hands(robot.hand_in_object.len());
         for (hand, X_AH) in robot.hand_in_object.iter().enumerate() {
             let X_AH = Pose::<Object, Hand>::from_array(X_AH).expect("a pose");

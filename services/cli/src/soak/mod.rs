@@ -23,6 +23,7 @@ use mikoshi_runtime::{Board, Domain, Position, Role, RunDirectory, State};
 use rustix::process::{Pid, Signal, kill_process};
 use serde::Serialize;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
@@ -86,8 +87,13 @@ pub fn soak(arguments: &SoakArguments) -> Result<Status, Failure> {
 
     let strikes = victims::draw(run.scenario.seed, arguments.kills, run.ticks, run.robots.len());
     let mut attempt = Attempt::start(arguments, &rough, false)?;
-    let mut watch =
-        Watch { run: &run, directory: attempt.directory(), kills: vec![], memory: Memory::default() };
+    let mut watch = Watch {
+        run: &run,
+        directory: attempt.directory(),
+        kills: vec![],
+        killed: BTreeSet::new(),
+        memory: Memory::default(),
+    };
     watch.strike_and_wait(&strikes, &mut attempt.child, &interrupts);
     let Watch { directory, kills, memory, .. } = watch;
     let disturbed = attempt.finish(&interrupts)?;
@@ -170,6 +176,8 @@ struct Watch<'a> {
     run: &'a RunSpec,
     directory: PathBuf,
     kills: Vec<Kill>,
+    /// Who was killed may still be there for a moment.
+    killed: BTreeSet<u32>,
     memory: Memory,
 }
 
@@ -214,11 +222,13 @@ impl Watch<'_> {
     /// Kills the process of a service, if it executes ticks.
     fn kill(&mut self, board: &Board, service: ServiceId, is_repeated: bool) -> bool {
         let is_running = board.states().any(|state| state == (Role::Service(service), State::Running));
-        let process = processes(board).into_iter().find(|(other, _)| *other == service);
-        let pid = process.and_then(|(_, pid)| i32::try_from(pid).ok()).and_then(Pid::from_raw);
-        let Some(pid) = pid.filter(|_| is_running) else { return false };
-        let is_killed = kill_process(pid, Signal::KILL).is_ok();
+        let mut processes = processes(board).into_iter();
+        let process = processes.find(|(other, pid)| *other == service && !self.killed.contains(pid));
+        let Some((_, number)) = process.filter(|_| is_running) else { return false };
+        let pid = i32::try_from(number).ok().and_then(Pid::from_raw);
+        let is_killed = pid.is_some_and(|pid| kill_process(pid, Signal::KILL).is_ok());
         if is_killed {
+            self.killed.insert(number);
             let Position { tick, phase } = board.last_position(service).unwrap_or_default();
             self.kills.push(Kill { service: label_of(self.run, service), tick, phase, is_repeated });
         }
@@ -293,9 +303,9 @@ impl SoakResult {
         // Writing to a String can't fail.
         let _ = writeln!(
             text,
-            "{} processes killed in {} ticks or between them; {:.1} s, undisturbed and in one thread {:.1} s",
+            "{} processes killed, in {} ticks; {:.1} s, undisturbed and in one thread {:.1} s",
             self.kills.len(),
-            self.kills.iter().map(|kill| kill.tick).collect::<std::collections::BTreeSet<_>>().len(),
+            self.kills.iter().map(|kill| kill.tick).collect::<BTreeSet<_>>().len(),
             self.disturbed_wall_time_s,
             self.undisturbed_wall_time_s,
         );
