@@ -112,11 +112,14 @@ impl<T: Transport> BridgeParticipant<T> {
 
 /// How far a joint's reference may come in a tick: forty turns a second are a mistake.
 const ABSURD_STEP_RAD: f64 = 1.0;
+/// How fast it may say that it moves.
+const ABSURD_RATE_RAD_S: f64 = 100.0;
 
 /// Whether drives may follow this command after the last one.
 fn is_credible(command: &JointCommand, last: &JointCommand) -> bool {
     let steps = command.joint_position_ref_rad.iter().zip(&last.joint_position_ref_rad);
     steps.into_iter().all(|(to, from)| (to - from).abs() <= ABSURD_STEP_RAD)
+        && command.joint_velocity_ref_rad_s.iter().all(|rate| rate.abs() <= ABSURD_RATE_RAD_S)
 }
 
 impl<T: Transport> Participant for BridgeParticipant<T> {

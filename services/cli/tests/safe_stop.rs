@@ -228,7 +228,9 @@ fn joint_commands_that_no_drive_can_follow_stop_the_team() {
 
 #[test]
 fn a_team_whose_sensors_recover_goes_on_when_the_operator_says_so_and_not_before() {
-    let run = walk("[{ at_s = 3.6, says = \"resume\" }, { at_s = 5.0, says = \"resume\" }]");
+    let run = walk(
+        "[{ at_s = 3.6, says = \"resume\" }, { at_s = 5.0, says = \"resume\" }, { at_s = 7.5, says = \"resume\" }]",
+    );
     let at = Sensors::FIELDS.iter().find(|field| field.name == "imu_specific_force_m_s2").expect("it has it");
     let at = at.offset_bytes;
     let fate = fate_of(&run, move |topic, tick, payload| {
@@ -237,8 +239,8 @@ fn a_team_whose_sensors_recover_goes_on_when_the_operator_says_so_and_not_before
         }
     });
     assert_eq!(fate.stop.map(|(_, cause, robot)| (cause, robot)), Some((stop_cause::INPUT, 2)), "{fate:?}");
-    // From the fifth bad reading on, to five seconds: at 3.6 s it is too early.
-    assert_eq!(fate.ticks_stopped, 1000 - (WALKING + 4), "{fate:?}");
+    // From the fifth bad reading on, to 7.5 s: at 3.6 s its sensors are still wrong, and at five it still steps.
+    assert_eq!(fate.ticks_stopped, 1500 - (WALKING + 4), "{fate:?}");
     assert!(fate.fell == 0 && fate.sunk_m < 0.02, "{fate:?}");
 }
 

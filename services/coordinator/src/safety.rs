@@ -4,7 +4,7 @@
 //!              the operator, or something wrong with a robot
 //!   Going on ──────────────────────────────────────────────▶ Stopped { cause }
 //!      ▲                                                          │
-//!      └──────────── the operator, once nothing is wrong ─────────┘
+//!      └───── the operator, once nothing is wrong and all stand ──┘
 //! ```
 //!
 //! A stopped team is in one mode whatever it did before: the object's reference comes to rest within its limits
@@ -29,6 +29,15 @@ pub(crate) struct Safety {
     torque_ticks: u64,
     /// What the scenario's operator says, by tick.
     script: Vec<(u64, u64)>,
+}
+
+/// What the coordinator knows of the team beside what robots say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SeenTeam {
+    /// Hands shall hold the object.
+    pub shall_hold: bool,
+    /// Nobody steps.
+    pub stands: bool,
 }
 
 /// What is remembered between ticks.
@@ -87,16 +96,17 @@ impl Safety {
         }
     }
 
-    /// One tick: what robots say of themselves, of which those with `hands` grasping hands shall hold the
-    /// object, or not; and what the operator has said last.
+    /// One tick: what robots say of themselves, each with the number of its grasping hands; what is known of the
+    /// team; and what the operator has said last.
     pub(crate) fn look<'a>(
         &self,
         state: &mut SafetyState,
         tick: u64,
         robots: impl Iterator<Item = (&'a RobotState, usize)>,
-        shall_hold: bool,
+        seen: SeenTeam,
         operator_word: u64,
     ) {
+        let SeenTeam { shall_hold, stands } = seen;
         let mut first = None;
         for (index, ((robot, hands), lasted)) in robots.zip(&mut state.lasted).enumerate() {
             for (cause, ticks) in stop_cause::ALL.into_iter().zip(lasted) {
@@ -117,7 +127,9 @@ impl Safety {
         }
         match first {
             Some((cause, robot)) if !state.is_stopped() => (state.cause, state.robot) = (cause, robot),
-            None if says.any(|command| command == operator::RESUME) => (state.cause, state.robot) = (0, 0),
+            None if stands && says.any(|command| command == operator::RESUME) => {
+                (state.cause, state.robot) = (0, 0);
+            }
             _ => {}
         }
     }
@@ -183,6 +195,8 @@ mod tests {
         Safety { limits, torque_ticks: 100, script: vec![(50, operator::STOP), (60, operator::RESUME)] }
     }
 
+    const STANDING: SeenTeam = SeenTeam { shall_hold: true, stands: true };
+
     fn well() -> RobotState {
         RobotState {
             base_pose: [0.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0],
@@ -201,7 +215,7 @@ mod tests {
                 spoil(&mut robots[1]);
             }
             // Past what the script says.
-            safety.look(&mut state, 1000 + tick, robots.iter().map(|robot| (robot, 2)), true, 0);
+            safety.look(&mut state, 1000 + tick, robots.iter().map(|robot| (robot, 2)), STANDING, 0);
             state.is_stopped().then_some((tick, state.cause, state.robot))
         })
     }
@@ -237,7 +251,7 @@ mod tests {
             if tick % PATIENCE_TICKS != 0 {
                 robot.zmp_margin_m = -1.0;
             }
-            safety.look(&mut state, tick, core::iter::once((&robot, 2)), true, 0);
+            safety.look(&mut state, tick, core::iter::once((&robot, 2)), STANDING, 0);
             assert!(!state.is_stopped());
         }
     }
@@ -246,7 +260,7 @@ mod tests {
     fn the_operator_stops_the_team_and_lets_it_go_on_by_script_or_by_word() {
         let (safety, mut state) = (safety(), SafetyState::default());
         let look = |state: &mut SafetyState, tick, robot: &RobotState, word| {
-            safety.look(state, tick, core::iter::once((robot, 2)), true, word);
+            safety.look(state, tick, core::iter::once((robot, 2)), STANDING, word);
             state.cause
         };
         for tick in 0..100 {
@@ -269,11 +283,20 @@ mod tests {
         let fallen = RobotState { zmp_margin_m: -0.1, ..well() };
         let mut word = 0;
         for tick in 1000..1020 {
-            safety.look(&mut state, tick, core::iter::once((&fallen, 2)), true, word);
+            safety.look(&mut state, tick, core::iter::once((&fallen, 2)), STANDING, word);
             word = operator::word_after(word, operator::RESUME);
         }
         assert_eq!((state.cause, state.robot), (stop_cause::BALANCE, 1));
-        safety.look(&mut state, 1020, core::iter::once((&well(), 2)), true, word);
+        safety.look(
+            &mut state,
+            1020,
+            core::iter::once((&well(), 2)),
+            SeenTeam { stands: false, ..STANDING },
+            word,
+        );
+        assert!(state.is_stopped(), "it still steps");
+        word = operator::word_after(word, operator::RESUME);
+        safety.look(&mut state, 1021, core::iter::once((&well(), 2)), STANDING, word);
         assert!(!state.is_stopped());
     }
 
@@ -282,7 +305,13 @@ mod tests {
         let (safety, mut state) = (safety(), SafetyState::default());
         let open = RobotState { holding_hands: 0, ..well() };
         for tick in 1000..1020 {
-            safety.look(&mut state, tick, core::iter::once((&open, 2)), false, 0);
+            safety.look(
+                &mut state,
+                tick,
+                core::iter::once((&open, 2)),
+                SeenTeam { shall_hold: false, ..STANDING },
+                0,
+            );
         }
         assert!(!state.is_stopped());
     }

@@ -153,6 +153,10 @@ impl Servo {
         out: &mut RobotState,
     ) {
         let kinematics = &mut scratch.measured;
+        if state.felt.is_none() {
+            // How fast the base is nobody has told meanwhile.
+            state.base.imu_velocity = None;
+        }
         let base = self.estimate_base(state, kinematics, sensors);
         let load = self.sense_hands(kinematics, sensors, out);
         state.felt = Some(self.sense_balance(&state.legs, kinematics, &base, load, sensors, out));

@@ -51,7 +51,7 @@ fn hands_that_find_nothing_stop_the_team_and_the_run_says_so() {
 
 #[test]
 fn processes_and_one_thread_grasp_and_lift_with_the_same_bytes() {
-    let short = ["--set", "motion=", "--set", "duration_s=20", "--set", "job.settle_s=0.2"];
+    let short = ["--set", "motion=", "--set", "duration_s=20", "--set", "job.settle_s=1.0"];
     let (_, threads) = pick_and_place(&[&short[..], &["--in-process"]].concat());
     let (_, processes) = pick_and_place(&short);
     assert_eq!(Log::read(&threads.log()).first_difference(&Log::read(&processes.log())), None);
