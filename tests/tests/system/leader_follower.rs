@@ -51,14 +51,15 @@ fn where_the_papers_leader_falls_the_page_says_what_ours_does() {
     let path = "sweeps/late_follower.toml";
     let text = fs::read_to_string(copy.path(path)).expect("it is there");
     let values = text.lines().find(|line| line.starts_with("values")).expect("it is a grid");
-    copy.replace(path, values, "values = [0.2, 1.3]");
+    copy.replace(path, values, "values = [0.2, 1.3, 2.5]");
     let (said, result, page) = sweep(&copy.path(path));
     assert_eq!(said.status, Some(0), "{said:#?}");
     let runs = &result["comparison"]["follower-delay"]["runs"];
     assert_eq!(runs[0]["leader"]["edge_s"], Value::Null, "it does not come to the edge");
     assert!(runs[1]["leader"]["edge_s"].as_f64().is_some_and(|edge_s| edge_s < 1.1), "{runs:#}");
     assert!(page.contains("the paper's leader"), "{page}");
-    assert!(page.contains("nobody falls with up to 1.3 s"), "{page}");
+    assert!(page.contains("nobody falls with up to 2.5 s"), "{page}");
+    assert!(page.contains("From a delay of 2.5 s on the team comes to a safe stop"), "{page}");
 }
 
 #[test]

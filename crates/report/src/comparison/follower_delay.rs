@@ -39,6 +39,8 @@ pub struct LateRun {
     pub leader: LateRobot,
     /// Who is too late.
     pub follower: LateRobot,
+    /// Whether the team came to a safe stop: what robots felt could not be believed any more.
+    pub stops: bool,
 }
 
 /// What became of a robot.
@@ -69,6 +71,12 @@ impl FollowerDelay {
         let mut findings: Vec<_> =
             ROBOTS.into_iter().map(|(name, of)| self.edge_finding(&runs, name, of)).collect();
         findings.push(self.paper_finding(&runs));
+        if let Some(first) = runs.iter().find(|run| run.stops) {
+            let delay_s = first.delay_s;
+            findings.push(format!(
+                "From a delay of {delay_s} s on the team comes to a safe stop before the end."
+            ));
+        }
         findings
     }
 
@@ -229,7 +237,12 @@ mod tests {
     }
 
     fn late(delay_s: f64, edge_s: Option<f64>) -> LateRun {
-        LateRun { delay_s, leader: robot(0.019, edge_s), follower: robot(0.003, Some(0.75)) }
+        LateRun {
+            delay_s,
+            leader: robot(0.019, edge_s),
+            follower: robot(0.003, Some(0.75)),
+            stops: delay_s > 1.0,
+        }
     }
 
     #[test]
@@ -252,6 +265,7 @@ mod tests {
             "Simulation and paper disagree: the paper's leader loses its balance with a delay of 1.3 s, here nobody \
              falls with up to 1.3 s; with 1.3 s the leader tilts by 4.0°."
         );
+        assert_eq!(said[3], "From a delay of 1.3 s on the team comes to a safe stop before the end.");
     }
 
     #[test]

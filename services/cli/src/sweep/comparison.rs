@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::pull::{Pull, pulls};
 use mikoshi_config::scenario::{Policy, Scenario};
 use mikoshi_config::sweep::Comparison;
+use mikoshi_ipc_types::mode;
 use mikoshi_report::{ComparedRuns, EdgeTime, FollowerDelay, LateRobot, LateRun, TimeToEdge};
 use mikoshi_resolution::resolve;
 use serde_json::Value;
@@ -37,6 +38,7 @@ struct Run {
     delay_s: f64,
     leader: LateRobot,
     follower: LateRobot,
+    stops: bool,
 }
 
 impl Run {
@@ -56,6 +58,7 @@ impl Run {
             delay_s: scenario.coordination.delay_s,
             leader: robot(leader),
             follower: robot(follower),
+            stops: summary["modes"].as_array().is_some_and(|modes| modes.iter().any(is_safe_stop)),
             pull,
         })
     }
@@ -70,7 +73,7 @@ impl Run {
     }
 
     fn late(&self) -> LateRun {
-        LateRun { delay_s: self.delay_s, leader: self.leader, follower: self.follower }
+        LateRun { delay_s: self.delay_s, leader: self.leader, follower: self.follower, stops: self.stops }
     }
 }
 
@@ -82,6 +85,10 @@ fn leader_and_follower(scenario: &Scenario) -> Option<(usize, usize)> {
         coordination.leader.as_ref().map_or(Some(0), |leader| names.position(|name| name == leader))?;
     let follower = (0..scenario.robots.len()).find(|index| *index != leader)?;
     (coordination.policy == Policy::LeaderFollower).then_some((leader, follower))
+}
+
+fn is_safe_stop(entry: &Value) -> bool {
+    entry["mode"] == mode::name(mode::SAFE_STOP)
 }
 
 /// What a summary says of a robot; times count from `start_s`.
