@@ -108,6 +108,12 @@ impl Children {
         Ok(())
     }
 
+    /// What sets this service's process apart.
+    pub fn variant(&self, service: ServiceId) -> Variant {
+        let process = self.processes.iter().find(|process| process.service == service);
+        process.map(|process| process.variant.clone()).unwrap_or_default()
+    }
+
     /// The successor of this service that is on its way.
     pub fn candidate(&self, service: ServiceId) -> Option<&ServiceProcess> {
         self.candidates.iter().find(|process| process.service == service)

@@ -76,11 +76,11 @@ impl RunObserver {
         self.swaps.push(swap);
     }
 
-    /// Keeps the description of the run that a service has from a swap on, if it is another. What the log
+    /// Keeps the description of the run that a service has from a swap on. What the log
     /// can't take now it will not take later either, and says so then.
-    pub fn note_revision(&mut self, swap: &Swap, service: ServiceId, revised: Option<&RunSpec>) {
-        if let (Some(log), Some(run)) = (&mut self.log, revised) {
-            let _ = log.write_revision(swap.tick, service, run);
+    pub fn note_revision(&mut self, swap: &Swap, service: ServiceId, revised: &RunSpec) {
+        if let Some(log) = &mut self.log {
+            let _ = log.write_revision(swap.tick, service, revised);
         }
     }
 

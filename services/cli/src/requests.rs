@@ -1,7 +1,7 @@
 //! What is asked for while a run goes on: processes that are replaced while they are in charge, and what the
 //! operator says.
 
-use crate::children::{Children, Variant};
+use crate::children::Children;
 use crate::control::{Client, Control, Request};
 use crate::observer::RunObserver;
 use crate::outcome::{label_of, robot_name, swap_of};
@@ -10,6 +10,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, operator};
 use mikoshi_resolution::write_spec;
 use mikoshi_runtime::Board;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Those of a run, and what has become of them so far.
@@ -17,6 +18,8 @@ pub struct Requests {
     control: Control,
     run_directory: PathBuf,
     pending: Vec<Pending>,
+    /// Of services whose process has other settings than the run began with.
+    revised: BTreeMap<ServiceId, RunSpec>,
     /// Descriptions written so far.
     specs: usize,
 }
@@ -38,7 +41,13 @@ impl Requests {
     /// Nobody could ask.
     pub fn listen(run_directory: &Path) -> std::io::Result<Self> {
         let control = Control::listen(run_directory)?;
-        Ok(Self { control, run_directory: run_directory.to_owned(), pending: Vec::new(), specs: 0 })
+        Ok(Self {
+            control,
+            run_directory: run_directory.to_owned(),
+            pending: Vec::new(),
+            revised: BTreeMap::new(),
+            specs: 0,
+        })
     }
 
     /// Whether a successor of this service is on its way.
@@ -84,7 +93,10 @@ impl Requests {
                     children.promote(service);
                     let swap = swap_of(run, service, since.tick + 1, "swap".to_owned());
                     client.done(format!("{} replaced in tick {}", label_of(run, service), swap.tick));
-                    observer.note_revision(&swap, service, revised.as_ref());
+                    if let Some(revised) = revised {
+                        observer.note_revision(&swap, service, &revised);
+                        self.revised.insert(service, revised);
+                    }
                     observer.note_swap(swap);
                 }
                 None if has_ended => {
@@ -119,11 +131,14 @@ impl Requests {
             return Err(format!("a successor of {name} is on its way already"));
         }
         let (epoch, _) = board.charge_of(service).ok_or("the board has no such service")?;
-        let mut variant = Variant { spec: None, program };
+        // What it does not say stays as it is.
+        let mut variant = children.variant(service);
+        variant.program = program.or(variant.program);
         let revised = match set {
             [] => None,
             set => {
-                let revised = revise(run, set).map_err(|failure| failure.message)?;
+                let current = self.revised.get(&service).unwrap_or(run);
+                let revised = revise(current, set).map_err(|failure| failure.message)?;
                 self.specs += 1;
                 let path = self.run_directory.join(format!("run-{}.bin", self.specs));
                 write_spec(&path, &revised).map_err(|error| error.to_string())?;

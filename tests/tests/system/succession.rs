@@ -142,6 +142,8 @@ fn a_swap_may_bring_other_settings_and_the_log_knows_them() {
         for arguments in [
             &["C", "--set", "balance.stabiliser=false"][..],
             &["coordinator", "--set", "hybrid.loop_gain=0.05"],
+            &["coordinator", "--set", "hybrid.filter_hz=9"],
+            &["C"],
         ] {
             let said = swap(running, arguments);
             assert_eq!(said.status, Some(0), "{said:#?}");

@@ -93,7 +93,7 @@ impl Verdict {
         }
     }
 
-    fn take(&mut self, tick: u64, executed: Result<Option<Difference>, mikoshi_runtime::TickError>) {
+    fn take(&mut self, tick: u64, executed: Result<Option<Difference>, TickError>) {
         let finding = match executed {
             Ok(None) => return,
             Ok(Some(difference)) => Finding::Differs(difference),
