@@ -7,7 +7,7 @@ use divan::{Bencher, black_box};
 use mikoshi_humanoid::balance::{
     ExternalLoad, Pendulum, PerFoot, Stabiliser, StabiliserConfig, StabiliserInputs, StabiliserState,
 };
-use mikoshi_humanoid::gait::{GaitConfig, GaitInputs, GaitState, GroundPose, StepClock, TeamClock};
+use mikoshi_humanoid::gait::{GaitConfig, GaitInputs, GroundPose, StepClock, TeamClock};
 use mikoshi_spatial::Wrench;
 use nalgebra::Vector3;
 use team::{Robot, soles};

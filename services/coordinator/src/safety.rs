@@ -227,7 +227,8 @@ mod tests {
 
     #[test]
     fn whatever_is_wrong_stops_the_team_within_twenty_ticks_and_is_named() {
-        let spoils: [(u64, fn(&mut RobotState)); 6] = [
+        type Spoil = fn(&mut RobotState);
+        let spoils: [(u64, Spoil); 6] = [
             (stop_cause::INPUT, |robot| robot.flags |= flag::INPUT_REJECTED),
             (stop_cause::HAND_WRENCH, |robot| robot.hand_wrench[1][2] = -301.0),
             (stop_cause::HAND_WRENCH, |robot| robot.hand_wrench[0][4] = 101.0),
