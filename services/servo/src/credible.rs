@@ -1,7 +1,7 @@
 //! What a servo believes: sensors and commands come from outside.
 
 use mikoshi_humanoid::Model;
-use mikoshi_ipc_types::{RobotState, Sensors, TeamCommand};
+use mikoshi_ipc_types::{PoseWire, RobotState, Sensors, TeamCommand};
 use mikoshi_spatial::{Hand, Pose, World};
 use nalgebra::Vector3;
 
@@ -15,7 +15,9 @@ const ABSURD_WRENCH: f64 = 1e4;
 const ABSURD_GYRO_RAD_S: f64 = 50.0;
 const ABSURD_ACCELERATION_M_S2: f64 = 1000.0;
 /// How far from where its hand is a robot may be asked to bring it.
-const ABSURD_REACH_M: f64 = 0.3;
+const ABSURD_REACH_M: f64 = 1.0;
+/// How far that may move in a tick; twenty metres a second are a mistake.
+const ABSURD_STEP_M: f64 = 0.1;
 
 /// Whether these readings may be those of the robot that `model` describes.
 pub(crate) fn are_credible(sensors: &Sensors, model: &Model) -> bool {
@@ -32,11 +34,32 @@ pub(crate) fn are_credible(sensors: &Sensors, model: &Model) -> bool {
         && all_below(&sensors.imu_specific_force_m_s2, ABSURD_ACCELERATION_M_S2)
 }
 
-/// Whether a robot in this state, with so many hands, may be asked for this.
-pub(crate) fn is_credible(command: &TeamCommand, robot: &RobotState, hands: usize) -> bool {
-    command.hand_pose_ref.iter().zip(&robot.hand_pose).take(hands).all(|(reference, pose)| {
-        let position = |[x, y, z, ..]: [f64; 7]| Vector3::new(x, y, z);
-        Pose::<World, Hand>::from_array(reference).is_some()
-            && (position(*reference) - position(*pose)).norm() <= ABSURD_REACH_M
-    })
+/// Whether a robot in this state, with so many hands, may be asked for this after `last`.
+pub(crate) fn is_credible(
+    command: &TeamCommand,
+    last: Option<&TeamCommand>,
+    robot: &RobotState,
+    hands: usize,
+) -> bool {
+    let gap = |(one, other): (&PoseWire, &PoseWire)| {
+        let position = |[x, y, z, ..]: PoseWire| Vector3::new(x, y, z);
+        (position(*one) - position(*other)).norm()
+    };
+    let mut references = command.hand_pose_ref.iter().take(hands);
+    let are_poses = references.all(|pose| Pose::<World, Hand>::from_array(pose).is_some());
+    let are_in_reach = command
+        .hand_pose_ref
+        .iter()
+        .zip(&robot.hand_pose)
+        .take(hands)
+        .all(|pair| gap(pair) <= ABSURD_REACH_M);
+    let are_continuous = last.is_none_or(|last| {
+        command
+            .hand_pose_ref
+            .iter()
+            .zip(&last.hand_pose_ref)
+            .take(hands)
+            .all(|pair| gap(pair) <= ABSURD_STEP_M)
+    });
+    are_poses && are_in_reach && are_continuous
 }

@@ -98,10 +98,10 @@ impl<T: Transport> ServoParticipant<T> {
         let first = self.coordination_delay_ticks;
         let command = match tick.checked_sub(first) {
             Some(command_tick) => {
-                match self.command_port.receive(command_tick, &mut self.arrived) {
-                    Ok(()) if self.servo.accepts(&self.arrived.payload, &self.robot_state) => {
-                        self.command = self.arrived.payload;
-                    }
+                let received = self.command_port.receive(command_tick, &mut self.arrived);
+                let (arrived, last) = (&self.arrived.payload, (tick > first).then_some(&self.command));
+                match received {
+                    Ok(()) if self.servo.accepts(arrived, last, &self.robot_state) => self.command = *arrived,
                     // Said in the next state.
                     Ok(()) | Err(TickError::NotFinite { .. }) if tick > first => self.command_rejected = 1,
                     Ok(()) => return Err(TickError::Service("the coordinator asks for what can't be")),

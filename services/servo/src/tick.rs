@@ -132,10 +132,15 @@ impl Servo {
         credible::are_credible(sensors, &self.robot.model)
     }
 
-    /// Whether its robot in this state may be asked for this.
-    pub(crate) fn accepts(&self, command: &TeamCommand, robot: &RobotState) -> bool {
+    /// Whether its robot in this state may be asked for this after `last`.
+    pub(crate) fn accepts(
+        &self,
+        command: &TeamCommand,
+        last: Option<&TeamCommand>,
+        robot: &RobotState,
+    ) -> bool {
         let is_clock = StepClock::from_words(command.step_clock).is_some();
-        is_clock && credible::is_credible(command, robot, self.robot.palms.len())
+        is_clock && credible::is_credible(command, last, robot, self.robot.palms.len())
     }
 
     /// Workspaces of its size.

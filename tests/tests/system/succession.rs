@@ -178,3 +178,23 @@ fn a_swap_that_can_not_be_is_refused_and_changes_nothing() {
 fn a_swap_without_a_run_is_an_error() {
     say_mikoshi(["swap", "A", "--run", "no-such-run"]).expect_error(2, &["no-such-run"]);
 }
+
+#[test]
+fn a_soak_kills_at_random_and_finds_no_difference() {
+    let results = Results::new();
+    let scenario = of_project("transport");
+    let out = results.path().join("soak");
+    let arguments = ["soak", "--kills", "8", "--quiet", "--seed", "2", "--out"].map(Path::new);
+    let arguments = arguments.into_iter().chain([out.as_path(), &scenario]);
+    let said = say_mikoshi(arguments.chain(WALK.map(Path::new)));
+    let told = std::fs::read(out.join("soak.json")).expect("a result");
+    let told: serde_json::Value = serde_json::from_slice(&told).expect("JSON");
+    // So short a walk does not meet what is asked of a long one; but nothing else is wrong.
+    assert_eq!(said.status, Some(1), "{said:#?}");
+    assert_eq!(told["undisturbed_hash"], told["disturbed_hash"], "{told:#}");
+    assert_eq!(told["left_behind"], serde_json::json!([]));
+    let kills = told["kills"].as_array().expect("a list").len();
+    assert!(kills >= 8, "{told:#}");
+    let failures = told["failures"].to_string();
+    assert!(!failures.contains("replaced"), "{failures}");
+}
