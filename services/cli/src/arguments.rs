@@ -62,7 +62,7 @@ const SOAK_EXAMPLES: &str = "\
 Examples:
   mikoshi soak config/scenarios/transport.toml                 (200 kills)
   mikoshi soak config/scenarios/transport.toml --seed 3 --kills 20 --out /tmp/soak
-  mikoshi soak config/scenarios/wander.toml --kills 0          (ten minutes: memory, falls)
+  mikoshi soak config/scenarios/transport.toml --kills 0       (memory)
 
 The run is carried out undisturbed in one thread, and then in processes of which some are killed at ticks drawn
 by seed, alone, in pairs, and twice in a row. Both must leave the same log, byte for byte, and nothing else.
