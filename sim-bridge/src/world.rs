@@ -10,6 +10,7 @@ use crate::truth;
 use crate::{BuildWorldError, LoadWorldError, StepWorldError, logging, mjcf};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, RobotTruth, Sensors, all_hands};
+use mikoshi_runtime::{read_parts, write_parts};
 use mikoshi_spatial::Wrench;
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};
 use nalgebra::Vector3;
@@ -271,13 +272,9 @@ impl World {
     pub fn save(&mut self, checkpoint: &mut [u8]) -> Result<(), LoadWorldError> {
         self.check_size(checkpoint)?;
         self.data.read_state_into(INTEGRATION, &mut self.scratch.simulator_state);
-        let mut rest = checkpoint;
-        for part in self.state.parts(&mut self.scratch.simulator_state) {
-            let (head, tail) = rest.split_at_mut(part.len());
-            head.copy_from_slice(part);
-            rest = tail;
-        }
-        Ok(())
+        write_parts(self.state.parts(&mut self.scratch.simulator_state), checkpoint)
+            .map(drop)
+            .map_err(|_| LoadWorldError { found: checkpoint.len(), expected: self.checkpoint_size() })
     }
 
     /// Returns to a checkpoint of a world of the same run. What follows is the same to the last bit.
@@ -286,15 +283,12 @@ impl World {
     /// There are not as many bytes as a checkpoint of this world has.
     pub fn load(&mut self, checkpoint: &[u8]) -> Result<(), LoadWorldError> {
         self.check_size(checkpoint)?;
-        let mut rest = checkpoint;
-        for part in self.state.parts(&mut self.scratch.simulator_state) {
-            let (head, tail) = rest.split_at(part.len());
-            part.copy_from_slice(head);
-            rest = tail;
+        let rejected = LoadWorldError { found: checkpoint.len(), expected: self.checkpoint_size() };
+        if read_parts(self.state.parts(&mut self.scratch.simulator_state), checkpoint).is_err()
+            || self.data.set_state(&self.scratch.simulator_state, INTEGRATION).is_err()
+        {
+            return Err(rejected);
         }
-        self.data
-            .set_state(&self.scratch.simulator_state, INTEGRATION)
-            .map_err(|_| LoadWorldError { found: checkpoint.len(), expected: self.checkpoint_size() })?;
         self.data.step1();
         Ok(())
     }

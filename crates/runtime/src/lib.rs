@@ -35,7 +35,7 @@ pub use real_time::{MissingRight, OnMissingRight, RealTime};
 pub use run_directory::{FoundRun, RunDirectory, RunDirectoryError};
 pub use runner::{Participant, Replaceable, RunFault, Session, run_in_one_thread, run_service};
 pub use schedule::{Call, Input, Output, Phase, Placement, Position, ScheduleError, TickSchedule};
-pub use snapshot::{read_state, state_schema, write_state};
+pub use snapshot::{read_parts, read_state, state_schema, write_parts, write_state};
 pub use topic::Topic;
 pub use transport::iceoryx::{IceoryxTap, IceoryxTransport, OpenError, required_bytes};
 pub use transport::memory::{InMemoryHub, InMemoryTap, InMemoryTransport};

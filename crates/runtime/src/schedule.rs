@@ -321,8 +321,7 @@ impl TickSchedule {
     /// any more, it is they who keep all others waiting.
     pub fn unhindered(&self, position_of: impl Fn(ServiceId) -> Position) -> Vec<ServiceId> {
         let is_published = |input: &Input, tick: u64| {
-            let publishes = |phase: &Phase| phase.outputs.iter().any(|output| output.topic == input.topic);
-            let phase = self.phases_of(input.from).position(publishes).unwrap_or_default();
+            let phase = self.phase_of(input.topic).unwrap_or_default();
             position_of(input.from) > Position { tick, phase }
         };
         let waits_for_nobody = |service: &ServiceId| {

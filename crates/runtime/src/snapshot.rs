@@ -30,6 +30,39 @@ pub fn read_state<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, TickError> {
         .ok_or(TickError::Checkpoint("the state can't be read"))
 }
 
+/// Writes these parts of a state, one after the other, to the beginning of `bytes`, and returns how much that
+/// is. It allocates nothing.
+///
+/// # Errors
+/// There is too little room.
+pub fn write_parts<'a>(
+    parts: impl IntoIterator<Item = &'a mut [u8]>,
+    bytes: &mut [u8],
+) -> Result<usize, TickError> {
+    let mut length = 0;
+    for part in parts {
+        let room = bytes.get_mut(length..length + part.len());
+        room.ok_or(TickError::Checkpoint("no room"))?.copy_from_slice(part);
+        length += part.len();
+    }
+    Ok(length)
+}
+
+/// Reads what [`write_parts`] wrote of parts of the same lengths, which are `bytes` long together.
+///
+/// # Errors
+/// There are fewer bytes: then the first parts may have been read.
+pub fn read_parts<'a>(parts: impl IntoIterator<Item = &'a mut [u8]>, bytes: &[u8]) -> Result<(), TickError> {
+    let mut rest = bytes;
+    for part in parts {
+        let (head, tail) =
+            rest.split_at_checked(part.len()).ok_or(TickError::Checkpoint("the state is too short"))?;
+        part.copy_from_slice(head);
+        rest = tail;
+    }
+    Ok(())
+}
+
 /// Names what a service keeps: its `name`, the `version` of its state's layout, and the frames that it keeps
 /// beside it or the world that it is the state of.
 pub fn state_schema(name: &str, version: u64, parts: &[u64]) -> u64 {
@@ -73,6 +106,19 @@ mod tests {
         bytes[0] = 7;
         assert!(read_state::<State>(&bytes[..length]).is_err());
         assert!(write_state(&STATES[2], &mut bytes[..length - 1]).is_err());
+    }
+
+    #[test]
+    fn parts_survive_and_what_is_too_short_for_them_is_an_error() {
+        let (mut one, mut other) = ([1_u8, 2], [3_u8, 4, 5]);
+        let mut bytes = [0xff; 6];
+        assert_eq!(write_parts([&mut one[..], &mut other], &mut bytes), Ok(5));
+        assert_eq!(bytes, [1, 2, 3, 4, 5, 0xff]);
+        assert!(write_parts([&mut one[..], &mut other], &mut bytes[..4]).is_err());
+        let (mut first, mut second) = ([0_u8; 2], [0_u8; 3]);
+        assert_eq!(read_parts([&mut first[..], &mut second], &bytes[..5]), Ok(()));
+        assert_eq!((first, second), (one, other));
+        assert!(read_parts([&mut first[..], &mut second], &bytes[..4]).is_err());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use core::time::Duration;
 use mikoshi_ipc_types::ServiceId;
 use rustix::process::{Pid, Signal, getpid, getppid, set_parent_process_death_signal};
 use std::ffi::OsStr;
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
@@ -166,7 +166,10 @@ impl Children {
         if let Some(spec) = &variant.spec {
             command.arg("--spec").arg(spec);
         }
-        let child = start(command, &log)
+        // After what its predecessors said.
+        let log_file = OpenOptions::new().create(true).append(true).open(&log);
+        let child = log_file
+            .and_then(|log_file| start_with(command, log_file))
             .map_err(|error| Failure::fault(error).context(format_args!("{label}: {}", program.display())))?;
         Ok(ServiceProcess { service, label, robot, variant, ended: None, child, log })
     }
@@ -257,10 +260,12 @@ impl ServiceProcess {
     }
 }
 
-/// Starts a process whose every word goes to a file, and which dies with the thread that calls this.
-pub(crate) fn start(mut command: Command, log: &Path) -> io::Result<Child> {
-    // After what its predecessors said.
-    let log = OpenOptions::new().create(true).append(true).open(log)?;
+/// Starts a process whose every word goes to a new file, and which dies with the thread that calls this.
+pub(crate) fn start(command: Command, log: &Path) -> io::Result<Child> {
+    start_with(command, File::create(log)?)
+}
+
+fn start_with(mut command: Command, log: File) -> io::Result<Child> {
     command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
     // A Ctrl-C at the terminal is for the supervisor, who ends all in order.
     command.process_group(0);

@@ -39,6 +39,19 @@ pub(crate) fn label_of(run: &RunSpec, service: ServiceId) -> String {
     robot_name(run, service).map_or_else(|| service.to_string(), |robot| format!("servo of robot {robot}"))
 }
 
+/// The service that people call so: `bridge`, `coordinator`, or a robot's name for its servo.
+///
+/// # Errors
+/// What there is, in words.
+pub(crate) fn service_named(run: &RunSpec, name: &str) -> Result<ServiceId, String> {
+    let services = || ServiceId::of_team(run.robots.len());
+    let name_of = |service| robot_name(run, service).map_or_else(|| service.to_string(), str::to_owned);
+    services().find(|service| name_of(*service) == name).ok_or_else(|| {
+        let expected: Vec<_> = services().map(name_of).collect();
+        format!("there is no service {name:?}; expected one of {}", expected.join(", "))
+    })
+}
+
 /// What summaries say of a fault.
 pub(crate) fn fault_of(run: &RunSpec, service: ServiceId, tick: u64, code: String) -> Fault {
     let robot = robot_name(run, service).map(str::to_owned);

@@ -4,7 +4,7 @@
 use crate::children::Children;
 use crate::control::{Client, Control, Request};
 use crate::observer::RunObserver;
-use crate::outcome::{label_of, robot_name, swap_of};
+use crate::outcome::{label_of, service_named, swap_of};
 use crate::revise::revise;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, operator};
@@ -121,12 +121,7 @@ impl Requests {
         set: &[(String, String)],
         program: Option<PathBuf>,
     ) -> Result<(ServiceId, u64, Option<RunSpec>), String> {
-        let services = || ServiceId::of_team(run.robots.len());
-        let name_of = |service| robot_name(run, service).map_or_else(|| service.to_string(), str::to_owned);
-        let service = services().find(|service| name_of(*service) == name).ok_or_else(|| {
-            let expected: Vec<_> = services().map(name_of).collect();
-            format!("there is no service {name:?}; expected one of {}", expected.join(", "))
-        })?;
+        let service = service_named(run, name)?;
         if self.is_pending(service) {
             return Err(format!("a successor of {name} is on its way already"));
         }

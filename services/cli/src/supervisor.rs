@@ -103,8 +103,9 @@ impl Supervisor {
         let board = Board::create(directory, &schedule.services(), true).map_err(Failure::fault)?;
         let succession = Succession::with_limit(run.scenario.supervision.restart_limit);
         board.set_succession(succession.is_promised());
-        let join = |role| Member::join(directory, role, WaitPolicy::default(), Entry::Vacant);
-        let join = |role| join(role).map_err(Failure::fault);
+        let join = |role| {
+            Member::join(directory, role, WaitPolicy::default(), Entry::Vacant).map_err(Failure::fault)
+        };
         let member = join(Role::Supervisor)?;
         let tap = IceoryxTap::open(directory, join(Role::Tap)?, schedule).map_err(Failure::fault)?;
         let requests = Requests::listen(directory).map_err(Failure::fault)?;

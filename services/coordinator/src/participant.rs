@@ -7,7 +7,8 @@ use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, Payload, RobotState, ServiceId, TeamCommand, TeamState, flag};
 use mikoshi_runtime::{
-    Call, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, state_schema,
+    Call, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_parts,
+    state_schema, write_parts,
 };
 
 /// The coordinator with its ports.
@@ -130,25 +131,13 @@ impl<T: Transport> Replaceable for CoordinatorParticipant<T> {
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
-        let mut length = 0;
-        for part in self.parts() {
-            let room = checkpoint.get_mut(length..length + part.len());
-            room.ok_or(TickError::Checkpoint("no room"))?.copy_from_slice(part);
-            length += part.len();
-        }
-        Ok(length)
+        write_parts(self.parts(), checkpoint)
     }
 
     fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
         if checkpoint.len() != self.state_bytes() {
             return Err(TickError::Checkpoint("the state has another length"));
         }
-        let mut rest = checkpoint;
-        for part in self.parts() {
-            let (head, tail) = rest.split_at(part.len());
-            part.copy_from_slice(head);
-            rest = tail;
-        }
-        Ok(())
+        read_parts(self.parts(), checkpoint)
     }
 }

@@ -205,14 +205,15 @@ impl Coordinator {
         let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
         let mut safety = state.safety;
         let of_team = robots.clone().zip(self.hands_of_robots.iter().copied());
-        let team = SeenTeam { shall_hold: mode::is_hybrid(phase.mode()), stands: state.clock.is_standing() };
+        let carries = mode::is_hybrid(phase.mode());
+        let team = SeenTeam { shall_hold: carries, stands: state.clock.is_standing() };
         self.safety.look(&mut safety, tick, of_team, team, state.operator_word);
         let is_stopped = safety.is_stopped();
         let is_free = self.job.is_in_the_air(&phase) && !self.presses;
         let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands, is_free)?;
         // Control ends with the first tick of doubt, and starts again after the last.
         let is_blind = safety.is_blind() || state.safety.is_blind();
-        let is_hybrid = mode::is_hybrid(phase.mode()) && !is_blind;
+        let is_hybrid = carries && !is_blind;
         let motion_ticks = self.job.motion_ticks(&phase, tick);
         let is_moving = motion_ticks.zip(self.motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
         let speed_share = if is_moving && !is_stopped { wishes.speed_share } else { 0.0 };
@@ -250,7 +251,7 @@ impl Coordinator {
                 .and_then(|()| leading.advance_clocks(&mut state.leading, &self.timing, &wishes))
                 .ok_or(CoordinateError::State)?;
         }
-        if is_blind && mode::is_hybrid(phase.mode()) {
+        if is_blind && carries {
             carry_hands(state, &mut law_output.hands, &X_WA_ref);
         }
         (state.motion, state.clock, state.hand_wrench, state.safety) = (motion, clock, hand_wrench, safety);
@@ -262,7 +263,7 @@ impl Coordinator {
         write_team_state(state, &phase, law_output, reference, out);
         out.team_state.speed_share = speed_share;
 
-        if is_blind && !safety.is_blind() && mode::is_hybrid(phase.mode()) {
+        if is_blind && !safety.is_blind() && carries {
             let X_WA = &law_output.position.external;
             let path_time_s = state.motion.path_time_s;
             state.motion = ObjectMotionState { path_time_s, ..ObjectMotionState::at_rest(X_WA) };

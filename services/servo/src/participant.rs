@@ -6,8 +6,8 @@ use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, TeamCommand, flag};
 use mikoshi_runtime::{
-    Call, ConnectError, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_state,
-    state_schema, write_state,
+    Call, ConnectError, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_parts,
+    read_state, state_schema, write_parts, write_state,
 };
 
 /// Why a servo could not be made.
@@ -171,26 +171,17 @@ impl<T: Transport> Replaceable for ServoParticipant<T> {
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
-        let (mut plain, state) =
+        let (plain, state) =
             checkpoint.split_at_mut_checked(PLAIN_BYTES).ok_or(TickError::Checkpoint("no room"))?;
-        for part in self.parts() {
-            let (head, tail) = plain.split_at_mut(part.len());
-            head.copy_from_slice(part);
-            plain = tail;
-        }
+        write_parts(self.parts(), plain)?;
         Ok(PLAIN_BYTES + write_state(&self.state, state)?)
     }
 
     fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
-        let (mut plain, state) = checkpoint
+        let (plain, state) = checkpoint
             .split_at_checked(PLAIN_BYTES)
             .ok_or(TickError::Checkpoint("the state is too short"))?;
         self.state = read_state(state)?;
-        for part in self.parts() {
-            let (head, tail) = plain.split_at(part.len());
-            part.copy_from_slice(head);
-            plain = tail;
-        }
-        Ok(())
+        read_parts(self.parts(), plain)
     }
 }

@@ -5,7 +5,7 @@ mod stage;
 
 use crate::arguments::ReplayArguments;
 use crate::failure::{Failure, Status};
-use crate::outcome::label_of;
+use crate::outcome::{label_of, service_named};
 use crate::print::print_out;
 use crate::revise::revise;
 use core::fmt::Write as _;
@@ -108,16 +108,8 @@ fn chosen(run: &RunSpec, services: Vec<ServiceId>, names: &[String]) -> Result<V
     if names.is_empty() {
         return Ok(services);
     }
-    let name_of = |service: &ServiceId| match service.robot().and_then(|robot| run.robots.get(robot)) {
-        Some(robot) => robot.member.name.clone(),
-        None => service.to_string(),
-    };
-    let find = |name: &String| {
-        services.iter().copied().find(|service| name_of(service) == *name).ok_or_else(|| {
-            let expected: Vec<_> = services.iter().map(name_of).collect();
-            Failure::usage(format!("--service: found {name:?}, expected one of {}", expected.join(", ")))
-        })
-    };
+    let find =
+        |name: &String| service_named(run, name).map_err(|error| Failure::usage(error).context("--service"));
     names.iter().map(find).collect()
 }
 
