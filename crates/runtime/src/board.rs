@@ -165,6 +165,8 @@ pub(crate) struct Slot {
     retirement: AtomicU32,
     fault: AtomicU32,
     message_length: AtomicU32,
+    /// The board's generation whose processes it is connected to.
+    welcomed: AtomicU32,
     progress: Progress,
     pub(crate) bed: Bed,
     /// Where one waits who will be in charge, or was.
@@ -256,6 +258,16 @@ impl Slot {
         self.bed.wake_anyway();
     }
 
+    /// Says that it is connected to all processes of this generation.
+    pub(crate) fn welcome(&self, generation: u32) {
+        self.welcomed.store(generation, Ordering::Release);
+    }
+
+    /// Whether it is connected to the processes of this generation.
+    pub(crate) fn has_welcomed(&self, generation: u32) -> bool {
+        self.welcomed.load(Ordering::Acquire) >= generation
+    }
+
     pub(crate) fn is_asked_to_retire(&self) -> bool {
         self.retirement.load(Ordering::Acquire) != 0
     }
@@ -315,7 +327,7 @@ struct Header {
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi4");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi5");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -466,10 +478,11 @@ impl Board {
         self.header().operator.load(Ordering::Acquire)
     }
 
-    /// Tells all others that a process has taken another one's place.
-    pub(crate) fn announce_successor(&self) {
-        self.header().generation.fetch_add(1, Ordering::AcqRel);
+    /// Tells all others that a process has taken another one's place. Returns the generation that it opens.
+    pub(crate) fn announce_successor(&self) -> u32 {
+        let generation = self.header().generation.fetch_add(1, Ordering::AcqRel) + 1;
         self.wake_all();
+        generation
     }
 
     pub(crate) fn generation(&self) -> u32 {

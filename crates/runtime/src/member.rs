@@ -46,6 +46,8 @@ pub struct Member {
     policy: WaitPolicy,
     /// Its incarnation; 0 until it is in charge.
     epoch: Cell<u64>,
+    /// Of the board, since it is in charge.
+    charge_generation: Cell<u32>,
     /// By slot; renewed when a successor takes the slot.
     watches: RefCell<Vec<Option<ProcessWatch>>>,
     /// Of the board, when it was last looked at.
@@ -83,6 +85,7 @@ impl Member {
             slot: index,
             policy,
             epoch: Cell::new(0),
+            charge_generation: Cell::new(0),
             watches: RefCell::new(board.slots().iter().map(|_| None).collect()),
             generation: Cell::new(board.generation()),
             on_successor: RefCell::default(),
@@ -119,8 +122,19 @@ impl Member {
         let claimed = self.slot().claim(ProcessIdentity::own()?, since);
         let epoch = claimed.map_err(|owner| JoinError::Occupied { role: self.role, owner })?;
         self.epoch.set(epoch);
-        self.board.announce_successor();
+        self.charge_generation.set(self.board.announce_successor());
         Ok(())
+    }
+
+    /// Waits until the tap, if one is attached, is connected to this successor: what that publishes would be
+    /// lost with it if it died before.
+    pub(crate) fn wait_for_welcome(&self) -> Result<(), TickError> {
+        let Some(tap) = self.slot_of(Role::Tap) else { return Ok(()) };
+        let generation = self.charge_generation.get();
+        self.wait_for(Reason::STATE, || {
+            let is_connected = (State::Wired..=State::Running).contains(&tap.state());
+            Ok((!is_connected || tap.has_welcomed(generation)).then_some(()))
+        })
     }
 
     /// Asks whoever is in charge to make room, and waits until there is nobody.
@@ -261,6 +275,8 @@ impl Member {
             && let Some(action) = &*self.on_successor.borrow()
         {
             action();
+            self.slot().welcome(generation);
+            self.board.wake_all();
         }
     }
 

@@ -416,6 +416,32 @@ fn a_run_waits_for_a_tap_that_stalls_and_goes_on_without_one_that_died() {
 }
 
 #[test]
+fn a_successor_says_nothing_before_the_tap_can_hear_it() {
+    let (victim, ticks) = (ServiceId::Coordinator, 2 * STALL_AT);
+    let last = STALL_AT + 5;
+    let mut running = Running::start_with(ticks, &["tap"], |service| {
+        if service == victim { vec![("KILL_AT", last), ("KILL_PHASE", 0), ("KILL_POINT", 2)] } else { vec![] }
+    });
+    running.board.set_succession(true);
+    let path = running.directory.path().to_path_buf();
+    let settings = |_| vec![("TICKS", ticks)];
+    replace_the_killed(&mut running.children, &path, [victim].into_iter(), settings);
+    while running.board.charge_of(victim).is_none_or(|(epoch, _)| epoch < 2) {
+        std::thread::yield_now();
+    }
+    // Give it the chance to say what would be lost.
+    for _ in 0..10_000 {
+        std::thread::yield_now();
+    }
+    assert_eq!(running.tick_of(victim), last);
+    running.kill("tap");
+    for (role, code) in running.exit_codes() {
+        assert_eq!(code, 0, "service {role}");
+    }
+    running.assert_leaves_nothing();
+}
+
+#[test]
 fn what_a_killed_supervisor_leaves_is_cleaned_at_the_next_start() {
     let base = base();
     let mut owner = spawn("owner", base.path(), &[]);

@@ -246,6 +246,7 @@ impl IceoryxTransport {
         member.wait_for_vacancy()?;
         let kept = self.load_latest(participant)?;
         member.take_charge(kept.unwrap_or_default()).map_err(|_| TickError::Fenced)?;
+        member.wait_for_welcome()?;
         Ok(kept)
     }
 
