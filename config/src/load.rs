@@ -124,7 +124,8 @@ pub(crate) fn load_with(
         document.set("seed", Node { origin: Origin::Option(format!("--seed {seed}").into()), value })?;
     }
 
-    let scenario: Scenario = decode(&document)?;
+    let mut scenario: Scenario = decode(&document)?;
+    scenario.coordination_delay_ticks = scenario.coordination_delay_ticks.max(scenario.least_delay_ticks());
     let saved_robots = Some(robots_beside(path)).filter(|folder| folder.is_dir());
     let robots = saved_robots.unwrap_or_else(|| sibling(path, "robots"));
     let models = load_models(&robots, &scenario, &document)?;

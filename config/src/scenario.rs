@@ -26,7 +26,10 @@ pub struct Scenario {
     pub seed: u64,
     /// Period of a tick.
     pub control_period_s: f64,
-    /// Age in ticks of the team command that a servo uses.
+    /// What makes a tick begin.
+    #[serde(default)]
+    pub clock: Clock,
+    /// Age in ticks of the team command that a servo uses; in wall-clock time at least 1.
     #[serde(default)]
     pub coordination_delay_ticks: u64,
     /// The carried object.
@@ -81,6 +84,11 @@ impl Scenario {
         (self.duration_s / self.control_period_s).round() as u64
     }
 
+    /// The least age of a team command: by the clock, robots don't wait for the coordinator.
+    pub(crate) fn least_delay_ticks(&self) -> u64 {
+        u64::from(self.clock == Clock::Wall)
+    }
+
     /// Tick at which the hybrid law starts; `None` if it never does.
     pub fn hybrid_start_tick(&self) -> Option<u64> {
         self.hybrid.start_s.map(|start_s| self.tick_at(start_s))
@@ -105,6 +113,17 @@ impl Scenario {
     pub fn substeps(&self) -> u64 {
         (self.control_period_s / self.physics.step_s).round() as u64
     }
+}
+
+/// What makes a tick begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Clock {
+    /// Every service waits for its inputs, however long they take: as fast as the machine goes.
+    #[default]
+    Lockstep,
+    /// Ticks begin a control period apart, and what does not come in time is done without.
+    Wall,
 }
 
 /// The carried object: a box.
@@ -350,11 +369,14 @@ pub struct Supervision {
     /// How often a service may die, or freeze, in one phase of one tick before the run ends. Each time but
     /// the last it gets a successor that goes on where it was. 0: the first death ends the run.
     pub restart_limit: u32,
+    /// Whether in wall-clock time every servo, and the coordinator, have a second process ready that takes over
+    /// when the first is lost or falls behind.
+    pub standby: bool,
 }
 
 impl Default for Supervision {
     fn default() -> Self {
-        Self { restart_limit: 3 }
+        Self { restart_limit: 3, standby: false }
     }
 }
 
@@ -372,6 +394,8 @@ pub struct Safety {
     pub tilt_max_rad: f64,
     /// For how long a drive may give all the torque it has.
     pub torque_limit_s: f64,
+    /// For how many ticks in a row a robot may say nothing, or hear nothing.
+    pub stale_limit_ticks: u64,
     /// What the operator says, and when.
     pub operator: Vec<OperatorEvent>,
 }
@@ -404,6 +428,7 @@ impl Default for Safety {
             zmp_margin_min_m: 0.0,
             tilt_max_rad: 0.2,
             torque_limit_s: 0.5,
+            stale_limit_ticks: 15,
             operator: vec![],
         }
     }

@@ -71,9 +71,11 @@ pub mod stop_cause {
     pub const TORQUE: u64 = 6;
     /// A hand that should hold the object does not.
     pub const GRASP: u64 = 7;
+    /// A robot has not been heard of for too long, or does not hear the others.
+    pub const STALE: u64 = 8;
 
     /// All of them.
-    pub const ALL: [u64; 7] = [OPERATOR, INPUT, HAND_WRENCH, BALANCE, TILT, TORQUE, GRASP];
+    pub const ALL: [u64; 8] = [OPERATOR, INPUT, HAND_WRENCH, BALANCE, TILT, TORQUE, GRASP, STALE];
 
     /// Its code in summaries.
     pub const fn name(cause: u64) -> &'static str {
@@ -85,6 +87,7 @@ pub mod stop_cause {
             TILT => "tilt",
             TORQUE => "torque-limit",
             GRASP => "grasp-lost",
+            STALE => "input-stale",
             _ => "unknown",
         }
     }
@@ -135,6 +138,8 @@ pub mod flag {
     pub const LEFT_FIRST: u64 = 1 << 7;
     /// A drive gives all the torque it has.
     pub const TORQUE_LIMIT: u64 = 1 << 8;
+    /// An input did not come in time; the last one serves.
+    pub const INPUT_MISSING: u64 = 1 << 9;
 }
 
 payload! {
@@ -159,6 +164,8 @@ payload! {
         pub holding_hands: u64,
         /// 1 if the last joint command was unusable: the drives hold the one before.
         pub command_rejected: u64,
+        /// One past the tick of the last joint command that has arrived; 0 before the first.
+        pub next_joint_command_tick: u64,
     }
 }
 
@@ -230,8 +237,8 @@ payload! {
         pub joint_velocity_ref_rad_s: [f64; MAX_JOINTS],
         /// Bit h: grasping hand h shall hold the object.
         pub closed_hands: u64,
-        /// Tick of the team command that this command is computed from.
-        pub team_command_tick: u64,
+        /// One past the tick of the last team command that has arrived; 0 before the first.
+        pub next_team_command_tick: u64,
     }
 }
 
@@ -261,6 +268,8 @@ payload! {
         pub stop_cause: u64,
         /// Which robot's fault that is, plus one; 0 if nobody's.
         pub stop_robot: u64,
+        /// For each robot, one past the tick of its last state that has arrived; 0 before the first.
+        pub next_state_tick: [u64; MAX_ROBOTS],
     }
 }
 

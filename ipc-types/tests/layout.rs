@@ -2,7 +2,7 @@
 //! understand each other: that is what their schema hashes say.
 
 use mikoshi_ipc_types::{
-    Audience, Envelope, Field, Frame, JointCommand, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS,
+    Audience, Envelope, Field, Frame, JointCommand, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS, MAX_ROBOTS,
     ObjectTruth, Payload, RobotState, RobotTruth, Scalar, Sensors, TeamCommand, TeamState, schema_hash,
 };
 
@@ -64,8 +64,8 @@ fn sizes_follow_from_the_limits() {
     let word = size_of::<f64>();
     assert_eq!(
         size_of::<Sensors>(),
-        word * (3 * MAX_JOINTS + 6 * MAX_HANDS + 6 * MAX_FEET + 3 + 3 + 2),
-        "three values by joint, wrists, ankles, gyroscope, accelerometer, hands that hold, whether a command was not"
+        word * (3 * MAX_JOINTS + 6 * MAX_HANDS + 6 * MAX_FEET + 3 + 3 + 3),
+        "three values by joint, wrists, ankles, gyroscope, accelerometer, hands that hold, two words on the command"
     );
     assert_eq!(
         size_of::<TeamCommand>(),
@@ -79,8 +79,8 @@ fn sizes_follow_from_the_limits() {
     );
     assert_eq!(
         size_of::<TeamState>(),
-        word * (2 * 6 * MAX_HANDS_OF_TEAM + 2 * 7 + 6 + 1 + 4 + 1 + 3),
-        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop"
+        word * (2 * 6 * MAX_HANDS_OF_TEAM + 2 * 7 + 6 + 1 + 4 + 1 + 3 + MAX_ROBOTS),
+        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, ticks by robot"
     );
     assert_eq!(
         size_of::<ObjectTruth>(),
@@ -95,7 +95,7 @@ fn a_byte_is_named_by_the_field_that_holds_it() {
     assert_eq!(name_at(0), Some("joint_position_rad"));
     assert_eq!(name_at(8 * MAX_JOINTS - 1), Some("joint_position_rad"));
     assert_eq!(name_at(8 * MAX_JOINTS), Some("joint_velocity_rad_s"));
-    assert_eq!(name_at(size_of::<Sensors>() - 1), Some("command_rejected"));
+    assert_eq!(name_at(size_of::<Sensors>() - 1), Some("next_joint_command_tick"));
     assert_eq!(name_at(size_of::<Sensors>()), None);
 }
 

@@ -14,6 +14,7 @@
 
 #![allow(non_snake_case)] // Monogram names, as in the crates of mathematics.
 
+mod coast;
 mod error;
 mod grasp;
 mod grip;

@@ -1,9 +1,10 @@
 //! The bridge on a transport.
 
+use crate::coast::Coast;
 use crate::{BuildWorldError, World};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{
-    Frame, JointCommand, MAX_JOINTS, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId,
+    Frame, JointCommand, MAX_JOINTS, MAX_ROBOTS, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId,
 };
 use mikoshi_runtime::{
     Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, Transport,
@@ -12,7 +13,7 @@ use mikoshi_runtime::{
 use thiserror::Error;
 
 /// Of the layout of a world's checkpoint: another one gets another number.
-const STATE_VERSION: u64 = 2;
+const STATE_VERSION: u64 = 3;
 
 /// Why a bridge could not be made.
 #[derive(Debug, Error)]
@@ -36,6 +37,9 @@ pub struct BridgeParticipant<T: Transport> {
     world: World,
     frame: Frame<JointCommand>,
     commands: Vec<JointCommand>,
+    /// One past the tick of the last command of each robot that has arrived; 0 before the first.
+    next_command_tick: [u64; MAX_ROBOTS],
+    coast: Coast,
     robots: Vec<RobotPorts<T>>,
     object_truth: T::Publisher<ObjectTruth>,
 }
@@ -64,6 +68,8 @@ impl<T: Transport> BridgeParticipant<T> {
         Ok(Self {
             world: World::new(run)?,
             commands: vec![frame.payload; robots.len()],
+            next_command_tick: [0; MAX_ROBOTS],
+            coast: Coast::of_period(run.scenario.control_period_s),
             frame,
             robots,
             object_truth: transport.publisher(0)?,
@@ -78,7 +84,9 @@ impl<T: Transport> BridgeParticipant<T> {
     fn publish_world(&mut self, tick: u64) -> Result<(), TickError> {
         for (robot, ports) in self.robots.iter_mut().enumerate() {
             let mut loan = ports.sensors.loan(tick)?;
-            self.world.sense(robot, loan.payload_mut());
+            let sensors = loan.payload_mut();
+            self.world.sense(robot, sensors);
+            sensors.next_joint_command_tick = self.next_command_tick.get(robot).copied().unwrap_or_default();
             loan.send()?;
         }
         for (robot, ports) in self.robots.iter_mut().enumerate() {
@@ -93,15 +101,21 @@ impl<T: Transport> BridgeParticipant<T> {
 
     fn step(&mut self, tick: u64) -> Result<(), TickError> {
         let mut rejected = 0;
-        let robots = self.robots.iter_mut().zip(&mut self.commands).zip(self.world.commands());
-        for (robot, ((ports, command), last)) in robots.enumerate() {
-            match ports.command.receive(tick, &mut self.frame) {
+        let heard = self.commands.iter_mut().zip(&mut self.next_command_tick);
+        let robots = self.robots.iter_mut().zip(heard).zip(self.world.commands());
+        for (robot, ((ports, (command, next_tick)), last)) in robots.enumerate() {
+            let received = ports.command.receive(tick, &mut self.frame);
+            if matches!(received, Ok(()) | Err(TickError::NotFinite { .. })) {
+                *next_tick = tick + 1;
+            }
+            match received {
                 Ok(()) if is_credible(&self.frame.payload, last) => *command = self.frame.payload,
                 // Drives hold what they were told last.
                 Ok(()) | Err(TickError::NotFinite { .. }) => {
                     *command = JointCommand { joint_velocity_ref_rad_s: [0.0; MAX_JOINTS], ..*last };
                     rejected |= 1 << robot;
                 }
+                Err(TickError::InputMissing { .. }) => *command = self.coast.after(last),
                 Err(error) => return Err(error),
             }
         }
@@ -161,17 +175,23 @@ impl<T: Transport> Replaceable for BridgeParticipant<T> {
     }
 
     fn state_bytes(&self) -> usize {
-        self.world.checkpoint_size()
+        size_of_val(&self.next_command_tick) + self.world.checkpoint_size()
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
-        let size = self.world.checkpoint_size();
-        let room = checkpoint.get_mut(..size).ok_or(TickError::Checkpoint("no room"))?;
-        self.world.save(room).map_err(|_| TickError::Checkpoint("the world can't be saved"))?;
-        Ok(size)
+        let room = checkpoint.get_mut(..self.state_bytes()).ok_or(TickError::Checkpoint("no room"))?;
+        let (heard, world) = room.split_at_mut(size_of_val(&self.next_command_tick));
+        heard.copy_from_slice(bytemuck::cast_slice(&self.next_command_tick));
+        self.world.save(world).map_err(|_| TickError::Checkpoint("the world can't be saved"))?;
+        Ok(self.state_bytes())
     }
 
     fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
-        self.world.load(checkpoint).map_err(|_| TickError::Checkpoint("it is of another world"))
+        let (heard, world) = checkpoint
+            .split_at_checked(size_of_val(&self.next_command_tick))
+            .ok_or(TickError::Checkpoint("the state is too short"))?;
+        self.world.load(world).map_err(|_| TickError::Checkpoint("it is of another world"))?;
+        bytemuck::cast_slice_mut(&mut self.next_command_tick).copy_from_slice(heard);
+        Ok(())
     }
 }

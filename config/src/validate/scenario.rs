@@ -99,6 +99,8 @@ fn safety(checks: &mut Checks, scenario: &Scenario) {
     checks.finite("safety.zmp_margin_min_m", safety.zmp_margin_min_m);
     checks.positive("safety.tilt_max_rad", safety.tilt_max_rad);
     checks.positive("safety.torque_limit_s", safety.torque_limit_s);
+    let stale_limit = safety.stale_limit_ticks;
+    checks.require(stale_limit > 0, "safety.stale_limit_ticks", stale_limit, "at least 1");
     for (index, event) in safety.operator.iter().enumerate() {
         checks.not_negative(format_args!("safety.operator.{index}.at_s"), event.at_s);
     }

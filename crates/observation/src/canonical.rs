@@ -5,7 +5,7 @@ use mikoshi_ipc_types::{
     TeamState,
 };
 
-/// All frames of one tick.
+/// All frames of one tick; in wall-clock time, of those that were lost the last that came.
 #[derive(Clone, Debug)]
 #[allow(missing_docs)]
 pub struct Observation {
@@ -150,8 +150,20 @@ impl Observation {
         taken.is_some()
     }
 
-    /// Every payload, in the order in which a tick produces them.
+    /// Whether a frame of this observation is of its tick. In wall-clock time it may have been lost, and is what
+    /// came last.
+    pub fn is_of_tick<P: Payload>(&self, frame: &Frame<P>) -> bool {
+        frame.envelope.tick == self.tick()
+    }
+
+    /// Every payload of the tick, in the order in which a tick produces them.
     pub fn for_each_payload(&self, mut visit: impl FnMut(PayloadRef<'_>)) {
+        let this_tick = self.tick();
+        let mut visit = |payload: PayloadRef<'_>| {
+            if payload.tick == this_tick {
+                visit(payload);
+            }
+        };
         fn each<P: Payload>(frames: &[Frame<P>], visit: &mut impl FnMut(PayloadRef<'_>)) {
             for (robot, frame) in frames.iter().enumerate() {
                 let bytes = bytemuck::bytes_of(&frame.payload);

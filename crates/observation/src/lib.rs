@@ -6,6 +6,7 @@
 
 mod canonical;
 mod figures;
+mod freshness;
 mod internal;
 mod log;
 mod reader;
@@ -15,6 +16,7 @@ mod truth;
 
 pub use canonical::{LogHash, Observation, Observed, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
+pub use freshness::Freshness;
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{Fault, InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};

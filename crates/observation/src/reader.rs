@@ -7,6 +7,7 @@ use crate::log::{ENCODING, PROFILE, REVISION_PREFIX, RUN_ATTACHMENT, schema_of};
 use mcap::McapError;
 use mcap::records::{Channel, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mikoshi_config::scenario::Clock;
 use mikoshi_config::{DecodeRunError, RunSpec};
 use mikoshi_ipc_types::ServiceId;
 use std::collections::BTreeMap;
@@ -48,6 +49,8 @@ pub struct LogReader {
     topics: BTreeMap<u16, Topic>,
     /// Where the payload that was handed out last lies.
     payload: Vec<u8>,
+    /// What lies there, if it is of a tick whose turn has not come.
+    pending: Option<(Topic, u64)>,
     damage: Option<McapError>,
     is_finished: bool,
 }
@@ -175,6 +178,7 @@ impl LogReader {
             schemas: BTreeMap::new(),
             topics: BTreeMap::new(),
             payload: Vec::new(),
+            pending: None,
             damage: None,
             is_finished: false,
         })
@@ -195,36 +199,54 @@ impl LogReader {
     /// # Errors
     /// The file can't be read; a payload whose layout is not this build's.
     pub fn next_payload(&mut self) -> Result<Option<PayloadRef<'_>>, ReadLogError> {
-        while !self.is_finished {
-            if let Some((topic, tick)) = self.advance()? {
-                let bytes = self.payload.as_slice();
-                return Ok(Some(PayloadRef { name: topic.kind.name, robot: topic.robot, tick, bytes }));
-            }
-        }
-        Ok(None)
+        let Some((topic, tick)) = self.next_topic()? else { return Ok(None) };
+        let bytes = self.payload.as_slice();
+        Ok(Some(PayloadRef { name: topic.kind.name, robot: topic.robot, tick, bytes }))
     }
 
     /// Puts all payloads of the next tick into `observation`; `false` at the end, or where a cut or damage
-    /// begins. Epochs and stamps are not recorded, and are zero.
+    /// begins. Epochs and stamps are not recorded, and are zero. What was lost in wall-clock time stays as it was.
     ///
     /// # Errors
     /// The file can't be read; a payload whose layout is not this build's; a tick that lacks frames.
     pub fn read_tick(&mut self, observation: &mut Observation) -> Result<bool, ReadLogError> {
         let expected = Kind::ALL.iter().map(|kind| kind.count(self.run.robots.len())).sum();
+        let may_lack_frames = self.run.scenario.clock == Clock::Wall;
         let (mut found, mut current) = (0, None);
         while found < expected {
-            let Some(payload) = self.next_payload()? else {
-                return Ok(false);
+            let next = self.next_topic()?;
+            let reject = |tick| ReadLogError::RejectTick { path: self.path.clone(), tick, found, expected };
+            let (topic, tick) = match next {
+                Some((topic, tick)) if current.is_none_or(|current| current == tick) => (topic, tick),
+                Some(next) if may_lack_frames => {
+                    self.pending = Some(next);
+                    return Ok(true);
+                }
+                Some((_, tick)) => return Err(reject(current.unwrap_or(tick))),
+                None => return Ok(may_lack_frames && self.damage.is_none() && found > 0),
             };
-            let tick = payload.tick;
-            let is_taken = *current.get_or_insert(tick) == tick && observation.take(&payload);
-            if !is_taken {
-                let tick = current.unwrap_or(tick);
-                return Err(ReadLogError::RejectTick { path: self.path.clone(), tick, found, expected });
+            current = Some(tick);
+            let bytes = self.payload.as_slice();
+            let payload = PayloadRef { name: topic.kind.name, robot: topic.robot, tick, bytes };
+            if !observation.take(&payload) {
+                return Err(reject(tick));
             }
             found += 1;
         }
         Ok(true)
+    }
+
+    /// The next payload, which then lies in `self.payload`.
+    fn next_topic(&mut self) -> Result<Option<(Topic, u64)>, ReadLogError> {
+        if let Some(pending) = self.pending.take() {
+            return Ok(Some(pending));
+        }
+        while !self.is_finished {
+            if let Some(found) = self.advance()? {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
     }
 
     /// One step through the file: at most one payload, which then lies in `self.payload`.

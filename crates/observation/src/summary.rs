@@ -120,7 +120,8 @@ pub struct RobotSummary {
     pub torque_limit_nm: BTreeMap<String, f64>,
 }
 
-/// How long ticks took; zero where no clock is read.
+/// How long ticks took; zero where no clock is read. In wall-clock time a tick is late that is more than a tenth of
+/// a period longer, and held where the world moved on without a robot's command.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Timing {
@@ -128,6 +129,9 @@ pub struct Timing {
     pub tick_p99_s: f64,
     pub ticks_late: u64,
     pub ticks_held: u64,
+    /// Frames that the recorder never saw.
+    #[serde(default)]
+    pub frames_lost: u64,
 }
 
 /// Something went wrong, and where.

@@ -1,7 +1,7 @@
 //! The schedule of a run.
 
-use mikoshi_config::RunSpec;
-use mikoshi_runtime::{Placement, ScheduleError, TickSchedule};
+use mikoshi_config::{RunSpec, scenario as config};
+use mikoshi_runtime::{Clock, Placement, ScheduleError, TickSchedule};
 
 /// The schedule by which all services of this run meet.
 ///
@@ -14,5 +14,13 @@ pub fn tick_schedule(run: &RunSpec) -> Result<TickSchedule, ScheduleError> {
         coordinator_core: placement.coordinator_core,
         servo_cores: placement.servo_cores.clone(),
     };
-    TickSchedule::of_team(run.robots.len(), run.scenario.coordination_delay_ticks, &placement)
+    let schedule =
+        TickSchedule::of_team(run.robots.len(), run.scenario.coordination_delay_ticks, &placement)?;
+    let clock = match run.scenario.clock {
+        config::Clock::Lockstep => Clock::Lockstep,
+        config::Clock::Wall => {
+            Clock::Wall { period_ns: (run.scenario.control_period_s * 1e9).round() as u64 }
+        }
+    };
+    Ok(schedule.with_clock(clock))
 }

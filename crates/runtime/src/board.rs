@@ -194,6 +194,11 @@ impl Slot {
         Role::from_wire(self.role.load(Ordering::Relaxed))
     }
 
+    /// Says from which phase on its owner speaks.
+    pub(crate) fn set_since(&self, since: Position) {
+        self.since.store(since.to_word(), Ordering::Release);
+    }
+
     pub(crate) fn state(&self) -> State {
         State::from_wire(self.state.load(Ordering::Acquire))
     }
@@ -240,6 +245,25 @@ impl Slot {
         if let Some(owner) = self.living_owner() {
             return Err(owner);
         }
+        self.take_from(found, process, since)
+    }
+
+    /// Gives the slot to a process though the one that has it lives: it is `frozen`, and fenced from now on.
+    pub(crate) fn seize(
+        &self,
+        frozen: ProcessIdentity,
+        process: ProcessIdentity,
+        since: Position,
+    ) -> Result<u64, ProcessIdentity> {
+        self.take_from(frozen.to_word(), process, since)
+    }
+
+    fn take_from(
+        &self,
+        found: u64,
+        process: ProcessIdentity,
+        since: Position,
+    ) -> Result<u64, ProcessIdentity> {
         // Of two successors one is first.
         self.owner
             .compare_exchange(found, process.to_word(), Ordering::AcqRel, Ordering::Acquire)
@@ -324,10 +348,14 @@ struct Header {
     generation: AtomicU32,
     /// What the operator has said last.
     operator: AtomicU64,
+    /// When tick 0 began, by the machine's monotonic clock; 0 before, and in lockstep.
+    origin_ns: AtomicU64,
+    /// Set when ticks are paced by the clock: the run goes on without those that are lost.
+    is_paced: AtomicU32,
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi5");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi6");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -421,6 +449,11 @@ impl Board {
         self.slots().iter().filter_map(|slot| Some((slot.role()?, slot.state())))
     }
 
+    /// The process in charge of this service, or the last that was.
+    pub fn process_of(&self, service: ServiceId) -> Option<ProcessIdentity> {
+        self.index_of(Role::Service(service)).and_then(|index| self.slots()[index].process())
+    }
+
     /// Where all services are.
     pub fn positions(&self) -> impl Iterator<Item = (ServiceId, Position)> {
         self.slots().iter().filter_map(|slot| match slot.role()? {
@@ -449,6 +482,25 @@ impl Board {
     /// Whether any process of the run still runs.
     pub fn has_living_process(&self) -> bool {
         self.slots().iter().filter_map(Slot::process).any(|process| process.is_alive())
+    }
+
+    /// Says that ticks are paced by the clock.
+    pub fn set_paced(&self) {
+        self.header().is_paced.store(1, Ordering::Release);
+    }
+
+    /// Whether ticks are paced by the clock.
+    pub fn is_paced(&self) -> bool {
+        self.header().is_paced.load(Ordering::Acquire) != 0
+    }
+
+    /// When tick 0 began, or would have begun had no time been lost; none before, and in lockstep.
+    pub(crate) fn origin_ns(&self) -> Option<u64> {
+        Some(self.header().origin_ns.load(Ordering::Acquire)).filter(|origin_ns| *origin_ns != 0)
+    }
+
+    pub(crate) fn set_origin_ns(&self, origin_ns: u64) {
+        self.header().origin_ns.store(origin_ns, Ordering::Release);
     }
 
     /// Asks all services to end. Their waits end within a moment.

@@ -2,7 +2,8 @@
 
 use crate::board::{Board, BoardError, Role, Slot, State};
 use crate::process::{ProcessIdentity, ProcessWatch};
-use crate::wait::{Reason, WaitPolicy, Woken};
+use crate::pace::{Pace, now_ns, sleep_until};
+use crate::wait::{Reason, Sleeper, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
 use core::cell::{Cell, RefCell};
 use mikoshi_ipc_types::ServiceId;
@@ -38,12 +39,23 @@ pub enum JoinError {
     Proc(#[from] io::Error),
 }
 
+/// How long a service must be behind the world before its standby takes its place, in ticks and in time: a
+/// machine that stalls for a moment stalls the standby, too.
+const PATIENCE_TICKS: u64 = 2;
+const PATIENCE_NS: u64 = 10_000_000;
+/// How often a standby looks, at most.
+const LEAST_LOOK_NS: u64 = 2_000_000;
+
 /// A process of a run. When it is dropped before [`Member::conclude`], all others learn that it failed.
 pub struct Member {
     board: Board,
     role: Role,
     slot: usize,
     policy: WaitPolicy,
+    /// Whose place it came for.
+    entry: Entry,
+    /// Whether nobody had the place before.
+    is_first: bool,
     /// Its incarnation; 0 until it is in charge.
     epoch: Cell<u64>,
     /// Of the board, since it is in charge.
@@ -63,6 +75,8 @@ pub enum Entry {
     Vacant,
     /// Also that of one who lives: it is asked to make room.
     Replace,
+    /// That of one who lives, once it is lost or falls behind.
+    Standby,
 }
 
 impl Member {
@@ -79,11 +93,13 @@ impl Member {
             return Err(JoinError::Occupied { role, owner });
         }
         // Of observers and supervisors there is no state to go on from.
-        let is_first = slot.epoch() == 0 || !matches!(role, Role::Service(_));
+        let is_first = entry != Entry::Standby && slot.epoch() == 0 || !matches!(role, Role::Service(_));
         let member = Self {
             role,
             slot: index,
             policy,
+            entry,
+            is_first,
             epoch: Cell::new(0),
             charge_generation: Cell::new(0),
             watches: RefCell::new(board.slots().iter().map(|_| None).collect()),
@@ -92,7 +108,7 @@ impl Member {
             board,
         };
         if is_first {
-            member.take_charge(Position::default())?;
+            member.take_charge(Position::default(), None)?;
         }
         Ok(member)
     }
@@ -114,12 +130,20 @@ impl Member {
 
     /// Whether somebody else was in charge before.
     pub(crate) fn is_successor(&self) -> bool {
-        self.slot().epoch() > 0 && self.epoch() != 1
+        !self.is_first
     }
 
-    /// From this phase on it speaks for its role.
-    pub(crate) fn take_charge(&self, since: Position) -> Result<(), JoinError> {
-        let claimed = self.slot().claim(ProcessIdentity::own()?, since);
+    /// From this phase on it speaks for its role; whoever is `frozen` in it does no more.
+    pub(crate) fn take_charge(
+        &self,
+        since: Position,
+        frozen: Option<ProcessIdentity>,
+    ) -> Result<(), JoinError> {
+        let (slot, own) = (self.slot(), ProcessIdentity::own()?);
+        let claimed = match frozen {
+            Some(frozen) => slot.seize(frozen, own, since),
+            None => slot.claim(own, since),
+        };
         let epoch = claimed.map_err(|owner| JoinError::Occupied { role: self.role, owner })?;
         self.epoch.set(epoch);
         self.charge_generation.set(self.board.announce_successor());
@@ -129,7 +153,7 @@ impl Member {
     /// Waits until the tap, if one is attached, is connected to this successor: what that publishes would be
     /// lost with it if it died before.
     pub(crate) fn wait_for_welcome(&self) -> Result<(), TickError> {
-        let Some(tap) = self.slot_of(Role::Tap) else { return Ok(()) };
+        let Some(tap) = self.slot_of(Role::Tap).filter(|_| !self.board.is_paced()) else { return Ok(()) };
         let generation = self.charge_generation.get();
         self.wait_for(Reason::STATE, || {
             let is_connected = (State::Wired..=State::Running).contains(&tap.state());
@@ -137,19 +161,58 @@ impl Member {
         })
     }
 
-    /// Asks whoever is in charge to make room, and waits until there is nobody.
-    pub(crate) fn wait_for_vacancy(&self) -> Result<(), TickError> {
+    /// Waits until its time has come: a standby, until whoever is in charge is lost or behind; any other asks
+    /// for room and waits until there is nobody. Returns the process that is to be fenced.
+    pub(crate) fn wait_for_vacancy(&self, pace: Option<&Pace>) -> Result<Option<ProcessIdentity>, TickError> {
         let slot = self.slot();
+        if self.entry == Entry::Standby {
+            return self.stand_by(pace);
+        }
         if slot.living_owner().is_some() {
             slot.ask_to_retire();
         }
-        self.wait_at_porch(|| slot.living_owner().is_none())
+        self.wait_at_porch(|| slot.living_owner().is_none())?;
+        Ok(None)
+    }
+
+    fn stand_by(&self, pace: Option<&Pace>) -> Result<Option<ProcessIdentity>, TickError> {
+        let slot = self.slot();
+        let period_ns = pace.map_or(LEAST_LOOK_NS, |pace| pace.period_ns);
+        let patience_ticks = PATIENCE_NS.div_ceil(period_ns).max(PATIENCE_TICKS);
+        let world = self.slot_of(Role::Service(ServiceId::Bridge));
+        let is_behind = || {
+            let world = world.map_or(Position::default(), Slot::position);
+            world.tick >= slot.position().tick.saturating_add(patience_ticks)
+        };
+        loop {
+            let look_ns = now_ns().saturating_add((period_ns / 2).max(LEAST_LOOK_NS));
+            // Whoever is in charge may make room, or be given up.
+            let gone = || (slot.state() == State::Retired || self.has_exited(self.slot)).then_some(());
+            let is_gone = self.wait_beside(Some(look_ns), || Ok(gone()))?.is_some();
+            if slot.state() == State::Done || self.board.stop_is_requested() {
+                return Err(TickError::Stopped);
+            }
+            if is_gone {
+                return Ok(None);
+            }
+            if pace.is_some() && slot.state() == State::Running && is_behind() {
+                return Ok(slot.process());
+            }
+        }
     }
 
     /// Waits beside the bed that whoever is in charge sleeps in.
     fn wait_at_porch(&self, is_over: impl Fn() -> bool) -> Result<(), TickError> {
-        let poll = || Ok(is_over().then_some(()));
-        self.slot().porch.wait(Reason::STATE, self.policy, poll, |_| match self.board.stop_is_requested() {
+        self.wait_beside(None, || Ok(is_over().then_some(()))).map(|_| ())
+    }
+
+    fn wait_beside(
+        &self,
+        due_ns: Option<u64>,
+        poll: impl Fn() -> Result<Option<()>, TickError>,
+    ) -> Result<Option<()>, TickError> {
+        let sleeper = Sleeper { reason: Reason::STATE, epoch: self.epoch() };
+        self.slot().porch.wait(sleeper, self.policy, due_ns, poll, |_| match self.board.stop_is_requested() {
             true => Err(TickError::Stopped),
             false => Ok(()),
         })
@@ -227,9 +290,12 @@ impl Member {
     /// Enters a state and waits until all services, and the tap if there is one, have come as far.
     pub(crate) fn meet(&self, state: State) -> Result<(), TickError> {
         self.enter(state);
+        let goes_on_without = |index| self.board.is_paced() && self.has_exited(index);
         self.wait_for(Reason::STATE, || {
-            let all_met = self.board.slots().iter().all(|slot| match (slot.role(), slot.state()) {
-                (Some(Role::Service(_)), State::Failed) => false,
+            let mut slots = self.board.slots().iter().enumerate();
+            let all_met = slots.all(|(index, slot)| match (slot.role(), slot.state()) {
+                (Some(Role::Service(_)), State::Failed) => self.board.is_paced(),
+                (Some(Role::Service(_)), other) if other < state && goes_on_without(index) => true,
                 (Some(Role::Service(_)), other) => other >= state,
                 // It may stay when all services have gone: what they sent is still to be read.
                 (Some(Role::Tap), other) => state == State::Done || other == State::Absent || other >= state,
@@ -248,6 +314,23 @@ impl Member {
         })
     }
 
+    /// Begins a tick at its time. If that is more than a period ago, all that follows is later by as much: a
+    /// world that stood still does not hurry afterwards.
+    pub(crate) fn begin_tick(&self, pace: &Pace, tick: u64) {
+        let now_ns = now_ns();
+        match self.board.origin_ns() {
+            Some(origin_ns) => {
+                let start_ns = pace.start_ns(origin_ns, tick);
+                if now_ns > start_ns.saturating_add(pace.period_ns) {
+                    self.board.set_origin_ns(origin_ns.saturating_add(now_ns - start_ns));
+                } else {
+                    sleep_until(start_ns);
+                }
+            }
+            None => self.board.set_origin_ns(now_ns.saturating_sub(pace.start_ns(0, tick)).max(1)),
+        }
+    }
+
     /// Polls until it returns something, and sleeps in between.
     ///
     /// # Errors
@@ -257,11 +340,26 @@ impl Member {
         reason: Reason,
         mut poll: impl FnMut() -> Result<Option<T>, TickError>,
     ) -> Result<T, TickError> {
+        loop {
+            if let Some(found) = self.wait_until(reason, None, &mut poll)? {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// As [`Member::wait_for`], but at `due_ns`, if there is such a time, the wait ends with nothing.
+    pub(crate) fn wait_until<T>(
+        &self,
+        reason: Reason,
+        due_ns: Option<u64>,
+        mut poll: impl FnMut() -> Result<Option<T>, TickError>,
+    ) -> Result<Option<T>, TickError> {
         let poll = || {
             self.welcome_successors();
             poll()
         };
-        self.slot().bed.wait(reason, self.policy, poll, |woken| {
+        let sleeper = Sleeper { reason, epoch: self.epoch() };
+        self.slot().bed.wait(sleeper, self.policy, due_ns, poll, |woken| {
             if !self.is_in_charge() {
                 return Err(TickError::Fenced);
             }
@@ -291,6 +389,9 @@ impl Member {
     /// Looks whether the run goes on. A death that nobody announced is named first: it is the cause of
     /// what others announce.
     fn look_around(&self) -> Result<(), TickError> {
+        if self.board.is_paced() {
+            return self.look_at_world();
+        }
         let mut failed: Option<(bool, ServiceId)> = None;
         let mut supervisor_is_lost = false;
         for (index, slot) in self.board.slots().iter().enumerate() {
@@ -321,6 +422,25 @@ impl Member {
             _ if self.board.stop_is_requested() => Err(TickError::Stopped),
             Some((_, service)) => Err(TickError::PeerLost(service)),
             None => Ok(()),
+        }
+    }
+
+    /// Where ticks are paced by the clock the run goes on without anybody but the world.
+    fn look_at_world(&self) -> Result<(), TickError> {
+        if self.board.stop_is_requested() {
+            return Err(TickError::Stopped);
+        }
+        let world = ServiceId::Bridge;
+        let Some(index) = self.board.index_of(Role::Service(world)).filter(|index| *index != self.slot) else {
+            return Ok(());
+        };
+        // Whether it has exited is asked before its state: one that is done says so before it exits.
+        let has_exited = self.has_exited(index) && !self.board.succession_is_promised();
+        match self.board.slots()[index].state() {
+            State::Failed => Err(TickError::PeerLost(world)),
+            State::Absent | State::Retired | State::Done => Ok(()),
+            _ if has_exited => Err(TickError::PeerLost(world)),
+            _ => Ok(()),
         }
     }
 

@@ -89,6 +89,19 @@ pub struct Phase {
     pub budget: f64,
 }
 
+/// What makes a tick begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Clock {
+    /// Every service waits for its inputs, however long they take.
+    #[default]
+    Lockstep,
+    /// Ticks begin at absolute times, a period apart; what is missing when a phase is due is done without.
+    Wall {
+        /// Of a tick.
+        period_ns: u64,
+    },
+}
+
 /// Cores by service. Empty leaves the choice to the operating system.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Placement {
@@ -147,6 +160,9 @@ impl Position {
     }
 }
 
+/// No phase waits longer for its inputs than this share of a period.
+const LATEST_START: f64 = 0.9;
+
 /// Why a list of phases is not a schedule.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs)]
@@ -169,6 +185,7 @@ pub enum ScheduleError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TickSchedule {
     phases: Vec<Phase>,
+    clock: Clock,
 }
 
 impl TickSchedule {
@@ -266,13 +283,52 @@ impl TickSchedule {
                 }
             }
         }
-        let schedule = Self { phases };
+        let schedule = Self { phases, clock: Clock::Lockstep };
         let mut topics: Vec<_> = schedule.outputs().map(|(_, output)| output.topic).collect();
         topics.sort_unstable();
         match topics.windows(2).find(|pair| pair[0] == pair[1]) {
             Some(pair) => Err(ScheduleError::PublishedTwice(pair[0])),
             None => Ok(schedule),
         }
+    }
+
+    /// The same phases by another clock.
+    pub fn with_clock(self, clock: Clock) -> Self {
+        Self { clock, ..self }
+    }
+
+    /// What makes a tick begin.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// The service whose phase opens the tick.
+    pub fn opener(&self) -> Option<ServiceId> {
+        self.phases.first().map(|phase| phase.service)
+    }
+
+    /// When a phase must start at the latest, in periods from the tick's beginning, so that it and all that
+    /// wait for it keep to their budgets; at most [`LATEST_START`].
+    pub fn latest_start(&self, phase: &Phase) -> f64 {
+        let Some(index) = self.phases.iter().position(|other| other == phase) else { return 0.0 };
+        let mut latest = vec![1.0_f64; self.phases.len()];
+        for index in (0..self.phases.len()).rev() {
+            let phase = &self.phases[index];
+            let waits_for_it = |input: &&Input| phase.outputs.iter().any(|output| output.topic == input.topic);
+            let mut end = 1.0_f64;
+            for (later, other) in self.phases.iter().enumerate() {
+                for input in other.inputs.iter().filter(waits_for_it) {
+                    // Who comes earlier in the tick uses what is older.
+                    let start = if later > index { latest[later] } else { 0.0 };
+                    end = end.min(start + input.age_ticks as f64);
+                }
+                if later > index && other.service == phase.service {
+                    end = end.min(latest[later]);
+                }
+            }
+            latest[index] = (end - phase.budget).clamp(0.0, LATEST_START);
+        }
+        latest[index]
     }
 
     /// The phases in canonical order.
@@ -475,6 +531,23 @@ mod tests {
         let mut phases = team_of(2, 0).phases().to_vec();
         phases.push(phases[0].clone());
         assert!(matches!(TickSchedule::new(phases), Err(ScheduleError::CalledTwice { .. })));
+    }
+
+    #[test]
+    fn a_phase_is_due_when_all_that_follows_it_can_still_keep_to_its_budget() {
+        let due = |delay_ticks, call| {
+            let schedule = team_of(2, delay_ticks);
+            let phase = schedule.phases().iter().find(|phase| phase.call == call).expect("it is there");
+            (1e6 * schedule.latest_start(phase)).round() / 1e6
+        };
+        // All in one tick.
+        assert_eq!(due(0, Call::Step), 0.5);
+        assert_eq!(due(0, Call::Act), 0.25);
+        assert_eq!(due(0, Call::Coordinate), 0.15);
+        assert_eq!(due(0, Call::Sense), 0.05);
+        // The coordinator has until the next tick.
+        assert_eq!(due(1, Call::Coordinate), 0.9);
+        assert_eq!(due(1, Call::Sense), 0.15);
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Waiting for another process: yield for a while, then sleep on a futex in shared memory.
 
 use core::sync::atomic::{AtomicU32, Ordering, fence};
+use crate::pace::now_ns;
 use rustix::event::Timespec;
 use rustix::thread::futex;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How a process waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,21 +25,35 @@ impl Default for WaitPolicy {
 }
 
 /// How long a sleeper sleeps before it looks whether those it waits for still live.
-const SLEEP: Timespec = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
+const SLEEP_NS: u64 = 100_000_000;
 
 /// What a process sleeps for, by a number that waker and sleeper agree on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Reason(u32);
+pub(crate) struct Reason(u16);
 
 impl Reason {
     /// The state of another slot.
-    pub(crate) const STATE: Self = Self(u32::MAX);
+    pub(crate) const STATE: Self = Self(u16::MAX);
     /// The tap's progress.
-    pub(crate) const CREDIT: Self = Self(u32::MAX - 1);
+    pub(crate) const CREDIT: Self = Self(u16::MAX - 1);
 
     /// The frame that the schedule lists at this place among its outputs.
     pub(crate) fn output(index: usize) -> Self {
-        Self(index as u32 + 1)
+        Self(index as u16 + 1)
+    }
+}
+
+/// Who sleeps, and what for: a process that lost its place must not be taken for its successor.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sleeper {
+    pub reason: Reason,
+    /// Its incarnation.
+    pub epoch: u64,
+}
+
+impl Sleeper {
+    fn to_word(self) -> u32 {
+        (self.epoch as u32) << u16::BITS | u32::from(self.reason.0)
     }
 }
 
@@ -48,8 +63,8 @@ impl Reason {
 pub(crate) struct Bed {
     /// Changes when the sleeper is woken: the futex.
     ticket: AtomicU32,
-    /// The [`Reason`] it sleeps for; 0 while it is awake.
-    reason: AtomicU32,
+    /// The [`Sleeper`]; 0 while it is awake.
+    sleeper: AtomicU32,
 }
 
 /// Why a sleep ended.
@@ -63,50 +78,59 @@ pub(crate) enum Woken {
 
 impl Bed {
     /// Polls until it returns something: at first giving way to others, then sleeping in between. After
-    /// each sleep `check` may end the wait.
+    /// each sleep `check` may end the wait. At `due_ns`, if there is such a time, it ends with nothing.
     ///
     /// Nothing is lost: the reason is written before the last poll, and a waker reads it after what it
     /// wakes for is visible. Both are separated by sequentially consistent fences, so that the sleeper
     /// sees the event or the waker sees the sleeper.
-    #[expect(clippy::disallowed_methods, reason = "how long to yield; no result depends on it")]
     pub(crate) fn wait<T, E>(
         &self,
-        reason: Reason,
+        sleeper: Sleeper,
         policy: WaitPolicy,
+        due_ns: Option<u64>,
         mut poll: impl FnMut() -> Result<Option<T>, E>,
         mut check: impl FnMut(Woken) -> Result<(), E>,
-    ) -> Result<T, E> {
+    ) -> Result<Option<T>, E> {
         if let Some(value) = poll()? {
-            return Ok(value);
+            return Ok(Some(value));
         }
-        let start = Instant::now();
-        while start.elapsed() < policy.yield_for {
+        let is_due = |now_ns: u64| due_ns.is_some_and(|due_ns| now_ns >= due_ns);
+        let start_ns = now_ns();
+        let end_ns = start_ns.saturating_add(policy.yield_for.as_nanos() as u64);
+        let mut time_ns = start_ns;
+        while time_ns < end_ns && !is_due(time_ns) {
             rustix::thread::sched_yield();
             if let Some(value) = poll()? {
-                return Ok(value);
+                return Ok(Some(value));
             }
+            time_ns = now_ns();
         }
-        loop {
-            self.reason.store(reason.0, Ordering::Relaxed);
+        let word = sleeper.to_word();
+        while !is_due(time_ns) {
+            self.sleeper.store(word, Ordering::Relaxed);
             fence(Ordering::SeqCst);
             let ticket = self.ticket.load(Ordering::Relaxed);
             let last_look = poll();
-            let woken = if matches!(last_look, Ok(None)) { self.sleep(ticket) } else { Woken::Called };
-            self.reason.store(0, Ordering::Relaxed);
+            let left_ns = due_ns.map_or(SLEEP_NS, |due_ns| due_ns.saturating_sub(now_ns()).min(SLEEP_NS));
+            let woken = if matches!(last_look, Ok(None)) { self.sleep(ticket, left_ns) } else { Woken::Called };
+            // By now it may be another one's.
+            let _ = self.sleeper.compare_exchange(word, 0, Ordering::Relaxed, Ordering::Relaxed);
             if let Some(value) = last_look? {
-                return Ok(value);
+                return Ok(Some(value));
             }
             if let Some(value) = poll()? {
-                return Ok(value);
+                return Ok(Some(value));
             }
             check(woken)?;
+            time_ns = now_ns();
         }
+        Ok(None)
     }
 
     /// Wakes the sleeper if it sleeps for this reason. What it is woken for has been written before.
     pub(crate) fn wake(&self, reason: Reason) {
         fence(Ordering::SeqCst);
-        if self.reason.load(Ordering::Relaxed) == reason.0 {
+        if self.sleeper.load(Ordering::Relaxed) as u16 == reason.0 {
             self.call();
         }
     }
@@ -114,14 +138,15 @@ impl Bed {
     /// Wakes the sleeper, whatever it sleeps for.
     pub(crate) fn wake_anyway(&self) {
         fence(Ordering::SeqCst);
-        if self.reason.load(Ordering::Relaxed) != 0 {
+        if self.sleeper.load(Ordering::Relaxed) != 0 {
             self.call();
         }
     }
 
     /// Sleeps unless somebody has called since the ticket was drawn.
-    fn sleep(&self, ticket: u32) -> Woken {
-        match futex::wait(&self.ticket, futex::Flags::empty(), ticket, Some(&SLEEP)) {
+    fn sleep(&self, ticket: u32, at_most_ns: u64) -> Woken {
+        let at_most = Timespec { tv_sec: 0, tv_nsec: at_most_ns as i64 };
+        match futex::wait(&self.ticket, futex::Flags::empty(), ticket, Some(&at_most)) {
             Err(rustix::io::Errno::TIMEDOUT) => Woken::TimedOut,
             _ => Woken::Called,
         }
@@ -130,6 +155,6 @@ impl Bed {
     fn call(&self) {
         self.ticket.fetch_add(1, Ordering::Relaxed);
         // Fails only for an address that is not mapped, and `self` is.
-        let _ = futex::wake(&self.ticket, futex::Flags::empty(), 1);
+        let _ = futex::wake(&self.ticket, futex::Flags::empty(), u32::MAX >> 1);
     }
 }

@@ -162,6 +162,9 @@ pub struct RunArguments {
     /// Run all services in one thread; the result is the same, byte for byte
     #[arg(long)]
     pub in_process: bool,
+    /// Pace ticks by the clock, and go on without what does not come in time
+    #[arg(long, conflicts_with = "in_process")]
+    pub real_time: bool,
     /// Where the results go [default: a new folder runs/NAME-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -17,6 +17,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 const GRACE: Duration = Duration::from_secs(2);
 /// How often it is looked whether they have.
 const LOOK: Duration = Duration::from_millis(2);
+/// How long a process that was taken over from may live on: it may wake up, and end by itself.
+const FENCED_GRACE: Duration = Duration::from_secs(1);
 /// Last words of a process that are shown when it failed.
 const LAST_LINES: usize = 12;
 
@@ -61,13 +63,17 @@ pub struct Children {
     processes: Vec<ServiceProcess>,
     /// Successors of processes that are still in charge.
     candidates: Vec<ServiceProcess>,
+    /// Those that take over by themselves.
+    standbys: Vec<ServiceProcess>,
+    /// Those that were taken over from while they lived, and since when.
+    fenced: Vec<(ServiceProcess, Stopwatch)>,
 }
 
 impl Children {
     /// None yet. What they say goes to files in `logs`.
     pub fn of(run_directory: &Path, logs: &Path) -> Self {
         let (run_directory, logs) = (run_directory.to_owned(), logs.to_owned());
-        Self { run_directory, logs, processes: Vec::new(), candidates: Vec::new() }
+        Self { run_directory, logs, processes: vec![], candidates: vec![], standbys: vec![], fenced: vec![] }
     }
 
     /// Starts a service, which people call `label`.
@@ -106,6 +112,72 @@ impl Children {
         let candidate = self.start(service, label, robot, variant, &[OsStr::new("--replace")])?;
         self.candidates.push(candidate);
         Ok(())
+    }
+
+    /// Starts a process that takes this service's place when whoever is in charge is lost or falls behind.
+    ///
+    /// # Errors
+    /// As [`Children::spawn`].
+    pub fn stand_by(&mut self, service: ServiceId) -> Result<(), Failure> {
+        let Some(process) = self.processes.iter().find(|process| process.service == service) else {
+            return Ok(());
+        };
+        let (label, robot, variant) = (process.label.clone(), process.robot.clone(), process.variant.clone());
+        let standby = self.start(service, label, robot, variant, &[OsStr::new("--standby")])?;
+        self.standbys.push(standby);
+        Ok(())
+    }
+
+    /// Whether a standby of this service lives.
+    pub fn has_standby(&self, service: ServiceId) -> bool {
+        self.standbys.iter().any(|standby| standby.service == service && standby.ended.is_none())
+    }
+
+    /// Takes note of standbys that are in charge by now, as `in_charge` says by service and process id; returns
+    /// which, and why.
+    pub fn note_promotions(
+        &mut self,
+        in_charge: impl Fn(ServiceId) -> Option<u32>,
+    ) -> Vec<(ServiceId, String)> {
+        let mut promotions = Vec::new();
+        let is_promoted =
+            |standby: &mut ServiceProcess| in_charge(standby.service) == Some(standby.child.id());
+        for standby in self.standbys.extract_if(.., is_promoted) {
+            let service = standby.service;
+            let process = self.processes.iter_mut().find(|process| process.service == service);
+            let Some(process) = process else { continue };
+            let mut predecessor = core::mem::replace(process, standby);
+            let cause = match predecessor.look().map(|ended| ended.status) {
+                Some(status) => match status.signal() {
+                    Some(signal) => format!("killed by signal {signal}"),
+                    None => "failed".to_owned(),
+                },
+                None => "fell behind".to_owned(),
+            };
+            // Of those before it nobody expects anything any more, and their places are needed.
+            for (other, _) in self.fenced.iter_mut().filter(|(other, _)| other.service == service) {
+                other.kill();
+            }
+            self.fenced.push((predecessor, Stopwatch::start()));
+            promotions.push((service, cause));
+        }
+        promotions
+    }
+
+    /// Standbys that have ended, though the run goes on.
+    pub fn lost_standbys(&mut self) -> Vec<ServiceId> {
+        let lost = self.standbys.extract_if(.., |standby| standby.look().is_some());
+        lost.map(|standby| standby.service).collect()
+    }
+
+    /// Ends those that were taken over from, once they had time to notice.
+    fn bury_fenced(&mut self) {
+        for (process, since_fenced) in &mut self.fenced {
+            if process.look().is_none() && since_fenced.elapsed() > FENCED_GRACE {
+                process.kill();
+            }
+        }
+        self.fenced.retain(|(process, _)| process.ended.is_none());
     }
 
     /// What sets this service's process apart.
@@ -181,6 +253,7 @@ impl Children {
 
     /// Looks which have ended; whether any of them ended otherwise than with success.
     pub fn look(&mut self) -> bool {
+        self.bury_fenced();
         for candidate in &mut self.candidates {
             candidate.look();
         }
@@ -201,7 +274,10 @@ impl Children {
         let since_asked = Stopwatch::start();
         loop {
             self.look();
-            let all = || self.processes.iter().chain(&self.candidates);
+            for standby in &mut self.standbys {
+                standby.look();
+            }
+            let all = || self.processes.iter().chain(&self.candidates).chain(&self.standbys);
             if all().all(|process| process.ended.is_some()) {
                 return;
             }
@@ -214,7 +290,9 @@ impl Children {
     }
 
     fn kill(&mut self) {
-        for process in self.processes.iter_mut().chain(&mut self.candidates) {
+        let fenced = self.fenced.iter_mut().map(|(process, _)| process);
+        let waiting = self.candidates.iter_mut().chain(&mut self.standbys);
+        for process in self.processes.iter_mut().chain(waiting).chain(fenced) {
             process.kill();
         }
     }

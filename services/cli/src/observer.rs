@@ -11,9 +11,10 @@ use crate::progress::Progress;
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
+use mikoshi_config::scenario::{Clock, Scenario};
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
-    Fault, Figures, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
+    Fault, Figures, Freshness, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
 };
 
 /// Observes a run: figures, hash, log, progress.
@@ -23,7 +24,9 @@ pub struct RunObserver {
     log: Option<LogWriter>,
     progress: Progress,
     stamps: Stamps,
-    swaps: Vec<Swap>,
+    freshness: Freshness,
+    frames_lost: u64,
+    swaps: Vec<(ServiceId, Swap)>,
     stops: Stops,
     ticks: u64,
     clock: Stopwatch,
@@ -47,6 +50,8 @@ impl RunObserver {
             log: log.transpose().map_err(Failure::fault)?,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, !arguments.quiet),
             stamps: Stamps::default(),
+            freshness: Freshness::with_delay(run.scenario.coordination_delay_ticks),
+            frames_lost: 0,
             swaps: vec![],
             stops: Stops::of(run),
             ticks: 0,
@@ -66,14 +71,25 @@ impl RunObserver {
             log.write(observation)?;
         }
         self.stops.observe(observation.tick(), &observation.team_state.payload);
-        self.ticks += 1;
+        self.freshness.observe(observation);
+        self.ticks = observation.tick() + 1;
         self.progress.set_ticks(self.ticks);
         Ok(())
     }
 
     /// Takes note of a process that was replaced.
-    pub fn note_swap(&mut self, swap: Swap) {
-        self.swaps.push(swap);
+    pub fn note_swap(&mut self, service: ServiceId, swap: Swap) {
+        self.swaps.push((service, swap));
+    }
+
+    /// Takes note of something that went wrong, though the run goes on.
+    pub fn note_fault(&mut self, fault: Fault) {
+        self.stops.faults.push(fault);
+    }
+
+    /// Takes note of frames that never came.
+    pub fn note_lost_frames(&mut self, frames: u64) {
+        self.frames_lost = frames;
     }
 
     /// Keeps the description of the run that a service has from a swap on. What the log
@@ -84,7 +100,7 @@ impl RunObserver {
         }
     }
 
-    /// Ticks observed so far.
+    /// Ticks that have gone by.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
@@ -101,6 +117,11 @@ impl RunObserver {
         }
         let (figures, scenario) = (self.figures.finish(), &run.scenario);
         let sim_time_s = self.ticks as f64 * scenario.control_period_s;
+        let freshness = &self.freshness;
+        let count_lost = |(service, swap): (ServiceId, Swap)| {
+            let ticks_lost = freshness.ticks_lost(service, swap.tick);
+            Swap { ticks_lost, ..swap }
+        };
         let mut summary = Summary {
             scenario: scenario.name.clone(),
             seed: scenario.seed,
@@ -121,9 +142,13 @@ impl RunObserver {
             robots: figures.robots,
             drift_between_robots_m: figures.drift_between_robots_m,
             unintended_contact_ticks: figures.unintended_contact_ticks,
-            timing: self.stamps.timing(),
+            timing: Timing {
+                ticks_held: self.freshness.ticks_held(),
+                frames_lost: self.frames_lost,
+                ..self.stamps.timing(scenario)
+            },
             faults: [self.stops.faults, faults].concat(),
-            swaps: self.swaps,
+            swaps: self.swaps.into_iter().map(count_lost).collect(),
         };
         if self.ticks < run.ticks {
             summary.failures.push(format!("the run ended after {} of {} ticks", self.ticks, run.ticks));
@@ -161,6 +186,9 @@ impl Stops {
     }
 }
 
+/// A tick is late if it took more than so many periods.
+const LATE: f64 = 1.1;
+
 /// When ticks began, by the bridge's clock.
 #[derive(Default)]
 struct Stamps {
@@ -175,15 +203,25 @@ impl Stamps {
         }
     }
 
-    /// All zero where no clock was read. In lockstep nothing is late and nothing is held.
-    fn timing(mut self) -> Timing {
+    /// All zero where no clock was read; in lockstep nothing is late.
+    fn timing(mut self, scenario: &Scenario) -> Timing {
         self.periods_ns.sort_unstable();
+        let late_ns = LATE * scenario.control_period_s * 1e9;
+        let ticks_late = match scenario.clock {
+            Clock::Lockstep => 0,
+            Clock::Wall => self.periods_ns.iter().filter(|period_ns| **period_ns as f64 > late_ns).count(),
+        };
         let quantile = |share: f64| {
             let last = self.periods_ns.len().saturating_sub(1);
             let index = (share * last as f64).round() as usize;
             Duration::from_nanos(self.periods_ns.get(index).copied().unwrap_or_default()).as_secs_f64()
         };
-        Timing { tick_p50_s: quantile(0.5), tick_p99_s: quantile(0.99), ticks_late: 0, ticks_held: 0 }
+        Timing {
+            tick_p50_s: quantile(0.5),
+            tick_p99_s: quantile(0.99),
+            ticks_late: ticks_late as u64,
+            ..Timing::default()
+        }
     }
 }
 

@@ -25,8 +25,19 @@ pub struct Prepared {
 /// # Errors
 /// Whatever is wrong with it: [`Status::Usage`](crate::failure::Status::Usage).
 pub fn prepare(arguments: &ScenarioArguments) -> Result<Prepared, Failure> {
-    let loaded =
-        load_scenario(&arguments.scenario, &arguments.overrides, arguments.seed).map_err(Failure::usage)?;
+    prepare_with(arguments, &[])
+}
+
+/// The same, with these values put in place of the scenario's after all others.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_with(
+    arguments: &ScenarioArguments,
+    overrides: &[(String, String)],
+) -> Result<Prepared, Failure> {
+    let overrides = [&arguments.overrides, overrides].concat();
+    let loaded = load_scenario(&arguments.scenario, &overrides, arguments.seed).map_err(Failure::usage)?;
     let run = resolve(&loaded).map_err(Failure::usage)?;
     let arms = team_arms(&run).map_err(Failure::usage)?;
     let law = build_hybrid_law(&run).map_err(|error| place(&loaded, error))?;

@@ -97,7 +97,7 @@ impl Requests {
                         observer.note_revision(&swap, service, &revised);
                         self.revised.insert(service, revised);
                     }
-                    observer.note_swap(swap);
+                    observer.note_swap(service, swap);
                 }
                 None if has_ended => {
                     let words = children.candidate(service).map(|process| process.last_words());

@@ -20,9 +20,10 @@ use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Fault, Observation, TeamTap};
 use mikoshi_resolution::{world_file, write_run};
 use mikoshi_runtime::{
-    Board, Domain, Entry, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State,
+    Board, Clock, Domain, Entry, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State,
     TickError, WaitPolicy, required_bytes,
 };
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -51,6 +52,7 @@ pub fn supervise(
     let directory = RunDirectory::create(&base).map_err(Failure::fault)?;
     let mut supervisor = Supervisor::start(prepared, directory.path(), &out.service_logs())?;
     let watched = supervisor.watch(prepared, observer, &interrupts);
+    observer.note_lost_frames(supervisor.team_tap.frames_lost());
     let outcome = supervisor.conclude(&prepared.run, watched);
     let world = world_file(directory.path());
     if world.exists()
@@ -93,6 +95,10 @@ struct Supervisor {
     member: Member,
     succession: Succession,
     requests: Requests,
+    /// Services that a run by the clock goes on without.
+    lost: BTreeSet<ServiceId>,
+    /// Whether standbys have been started.
+    stands_by: bool,
 }
 
 impl Supervisor {
@@ -103,6 +109,9 @@ impl Supervisor {
         let board = Board::create(directory, &schedule.services(), true).map_err(Failure::fault)?;
         let succession = Succession::with_limit(run.scenario.supervision.restart_limit);
         board.set_succession(succession.is_promised());
+        if is_paced(prepared) {
+            board.set_paced();
+        }
         let join = |role| {
             Member::join(directory, role, WaitPolicy::default(), Entry::Vacant).map_err(Failure::fault)
         };
@@ -114,8 +123,9 @@ impl Supervisor {
             children.spawn(service, label_of(run, service), robot_name(run, service))?;
         }
         // While services set themselves up.
-        let team_tap = TeamTap::new(&tap, run.robots.len()).map_err(Failure::fault)?;
-        Ok(Self { children, tap, team_tap, member, succession, requests })
+        let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
+        let lost = BTreeSet::new();
+        Ok(Self { children, tap, team_tap, member, succession, requests, lost, stands_by: false })
     }
 
     fn watch(&mut self, prepared: &Prepared, observer: &mut RunObserver, interrupts: &Interrupts) -> Watched {
@@ -134,7 +144,7 @@ impl Supervisor {
                         return Watched::Unobservable(Failure::fault(error));
                     }
                     self.tap.set_consumed(observer.ticks());
-                    if observer.ticks() == prepared.run.ticks {
+                    if observer.ticks() >= prepared.run.ticks {
                         return Watched::All;
                     }
                 }
@@ -150,8 +160,11 @@ impl Supervisor {
             if let Some(signal) = interrupts.received() {
                 return Watched::Signal(signal);
             }
-            if !self.look_after(&prepared.run, observer) || self.any_service_is(State::Failed) {
+            if !self.look_after(prepared, observer) || self.is_given_up(prepared) {
                 return Watched::Lost;
+            }
+            if is_paced(prepared) && self.service_states().all(|(_, state)| state.has_ended()) {
+                self.team_tap.give_up_waiting();
             }
             let is_set_up = self.all_services_are(State::Ready);
             let lasted = standstill.look(self.progress(), clock.lap());
@@ -167,31 +180,105 @@ impl Supervisor {
     }
 
     /// Sees to successors of processes that were killed; `false` if somebody is lost for good.
-    fn look_after(&mut self, run: &RunSpec, observer: &mut RunObserver) -> bool {
+    fn look_after(&mut self, prepared: &Prepared, observer: &mut RunObserver) -> bool {
+        let run = &prepared.run;
         self.children.look();
         self.requests.look(run, self.member.board(), &mut self.children, observer);
+        self.see_to_standbys(prepared, observer);
         let fallen = self.children.processes().iter().filter(|process| {
+            let service = process.service;
             let has_failed = process.ended.is_some_and(|ended| !ended.status.success());
             // Whose successor waits already needs no other.
-            let is_succeeded =
-                self.succession.is_due(process.service) || self.requests.is_pending(process.service);
-            has_failed && !is_succeeded
+            let is_succeeded = self.succession.is_due(service)
+                || self.requests.is_pending(service)
+                || self.children.has_standby(service);
+            has_failed && !is_succeeded && !self.lost.contains(&service)
         });
         let fallen: Vec<_> = fallen.map(|process| (process.service, process.signal())).collect();
         for (service, signal) in fallen {
             let (at, has_said_why) = self.last_position(service);
-            let Some(signal) = signal.filter(|_| !has_said_why) else { return false };
-            if !self.succession.take_note(service, at, format!("killed by signal {signal}")) {
+            let cause = signal.filter(|_| !has_said_why).map(|signal| format!("killed by signal {signal}"));
+            let may_go_on = cause.is_some_and(|cause| self.succession.take_note(service, at, cause));
+            if !may_go_on && !self.give_up(prepared, service, at.tick, observer) {
                 return false;
             }
         }
         while let Some(Vacancy { service, at, cause }) = self.succession.next() {
+            // Where one took over by itself, what is missing is the next that can.
+            let is_served =
+                self.children.processes().iter().any(|p| p.service == service && p.ended.is_none());
+            if is_served {
+                if self.children.stand_by(service).is_err() {
+                    return false;
+                }
+                continue;
+            }
             if self.children.succeed(service).is_err() {
                 return false;
             }
-            observer.note_swap(swap_of(run, service, at.tick, cause));
+            observer.note_swap(service, swap_of(run, service, at.tick, cause));
         }
         true
+    }
+
+    /// Goes on without a service, if a run can: by the clock, and if it is not the world.
+    fn give_up(
+        &mut self,
+        prepared: &Prepared,
+        service: ServiceId,
+        tick: u64,
+        observer: &mut RunObserver,
+    ) -> bool {
+        let may_go_on = is_paced(prepared) && service != ServiceId::Bridge;
+        if may_go_on && self.lost.insert(service) {
+            let run = &prepared.run;
+            let label = label_of(run, service);
+            print_error(&as_lines("warning", &format!("{label} is lost in tick {tick}; the team stops")));
+            observer.note_fault(fault_of(run, service, tick, "lost".to_owned()));
+        }
+        may_go_on
+    }
+
+    /// Starts standbys, and sees which have taken over.
+    fn see_to_standbys(&mut self, prepared: &Prepared, observer: &mut RunObserver) {
+        let run = &prepared.run;
+        if !is_paced(prepared) || !run.scenario.supervision.standby {
+            return;
+        }
+        if !self.stands_by && self.all_services_are(State::Running) {
+            self.stands_by = true;
+            for service in prepared.schedule.services() {
+                // Without the world there is nobody to keep up with.
+                if service != ServiceId::Bridge && self.children.stand_by(service).is_err() {
+                    print_error(&as_lines("warning", &format!("{} has no standby", label_of(run, service))));
+                }
+            }
+        }
+        let board = self.member.board();
+        let in_charge = |service| board.process_of(service).map(|process| process.pid);
+        for (service, cause) in self.children.note_promotions(in_charge) {
+            let since = self.member.board().charge_of(service).map_or(0, |(_, since)| since.tick);
+            observer.note_swap(service, swap_of(run, service, since + 1, cause.clone()));
+            self.ask_for_standby(service, cause);
+        }
+        for service in self.children.lost_standbys() {
+            if !self.service_states().any(|(other, state)| other == service && state.has_ended()) {
+                self.ask_for_standby(service, "the standby ended".to_owned());
+            }
+        }
+    }
+
+    fn ask_for_standby(&mut self, service: ServiceId, cause: String) {
+        let (at, _) = self.last_position(service);
+        // One too many: the last that is in charge has none behind it.
+        let _ = self.succession.take_note(service, at, cause);
+    }
+
+    /// Whether somebody has failed without whom the run can't go on.
+    fn is_given_up(&self, prepared: &Prepared) -> bool {
+        self.service_states().any(|(service, state)| {
+            state == State::Failed && (!is_paced(prepared) || service == ServiceId::Bridge)
+        })
     }
 
     /// Kills those that are frozen, for their successors' sake; `false` if they may have none.
@@ -226,7 +313,7 @@ impl Supervisor {
         }
         self.children.end();
         let outcome = match watched {
-            Watched::All if !self.children.look() => Outcome::Completed,
+            Watched::All if self.all_have_served() => Outcome::Completed,
             Watched::All | Watched::Lost => self.diagnose(run),
             Watched::Signal(signal) => Outcome::Interrupted(signal),
             Watched::Stalled(stall) => stalled(run, &stall, &before),
@@ -265,12 +352,18 @@ impl Supervisor {
         Outcome::Fault { failure, faults }
     }
 
-    fn all_services_are(&self, state: State) -> bool {
-        self.service_states().all(|(_, found)| found >= state)
+    /// Whether nobody has failed but those that the run went on without.
+    fn all_have_served(&mut self) -> bool {
+        self.children.look();
+        let has_failed =
+            |process: &ServiceProcess| process.ended.is_some_and(|ended| !ended.status.success());
+        let others =
+            self.children.processes().iter().filter(|process| !self.lost.contains(&process.service));
+        !others.into_iter().any(has_failed)
     }
 
-    fn any_service_is(&self, state: State) -> bool {
-        self.service_states().any(|(_, found)| found == state)
+    fn all_services_are(&self, state: State) -> bool {
+        self.service_states().all(|(_, found)| found >= state)
     }
 
     fn service_states(&self) -> impl Iterator<Item = (ServiceId, State)> {
@@ -301,6 +394,11 @@ impl Supervisor {
         let least = self.service_states().map(|(_, state)| state).min();
         self.service_states().filter(|(_, state)| Some(*state) == least).map(|(service, _)| service).collect()
     }
+}
+
+/// Whether ticks are paced by the clock.
+fn is_paced(prepared: &Prepared) -> bool {
+    matches!(prepared.schedule.clock(), Clock::Wall { .. })
 }
 
 /// One failed process in words.

@@ -130,7 +130,7 @@ fn fate_of(run: &RunSpec, spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fa
     let mut participants: Vec<_> = services
         .map(|id| participant(run, id, &Spoilt { inner: hub.transport(id), spoil: Rc::clone(&spoil) }))
         .collect();
-    let mut tap = TeamTap::new(&hub.tap(), run.robots.len()).expect("a tap");
+    let mut tap = TeamTap::new(&hub.tap(), run.robots.len(), Clock::Lockstep).expect("a tap");
     let mut seen = Observation::for_team(run.robots.len());
     let mut fate = Fate { margin_min_m: f64::INFINITY, ..Fate::default() };
     let mut height_m = None;

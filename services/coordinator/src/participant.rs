@@ -5,7 +5,7 @@ use crate::safety::is_credible;
 use crate::tick::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState, STATE_VERSION};
 use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{Frame, Payload, RobotState, ServiceId, TeamCommand, TeamState, flag};
+use mikoshi_ipc_types::{Frame, MAX_ROBOTS, Payload, RobotState, ServiceId, TeamCommand, TeamState, flag};
 use mikoshi_runtime::{
     Call, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_parts,
     state_schema, write_parts,
@@ -21,6 +21,8 @@ pub struct CoordinatorParticipant<T: Transport> {
     arrived: Frame<RobotState>,
     /// The last that could be used.
     robot_states: Vec<RobotState>,
+    /// One past the tick of the last state of each robot that has arrived; 0 before the first.
+    next_state_tick: [u64; MAX_ROBOTS],
     robot_state_ports: Vec<T::Subscriber<RobotState>>,
     command_ports: Vec<T::Publisher<TeamCommand>>,
     team_state_port: T::Publisher<TeamState>,
@@ -41,6 +43,7 @@ impl<T: Transport> CoordinatorParticipant<T> {
             outputs: vec![CoordinatorOutputs::default(); run.scenario.coordination_delay_ticks as usize + 1],
             arrived: Frame::zeroed(),
             robot_states: vec![RobotState::zeroed(); run.robots.len()],
+            next_state_tick: [0; MAX_ROBOTS],
             robot_state_ports: robots.clone().map(|r| transport.subscriber(r)).collect::<Result<_, _>>()?,
             command_ports: robots.map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
             team_state_port: transport.publisher(0)?,
@@ -51,16 +54,23 @@ impl<T: Transport> CoordinatorParticipant<T> {
 
     fn coordinate(&mut self, tick: u64) -> Result<(), TickError> {
         let hands = self.coordinator.hands_of_robots().iter();
-        let ports = self.robot_state_ports.iter_mut().zip(&mut self.robot_states).zip(hands);
-        for ((port, believed), &hands) in ports {
-            let last = (tick > 0).then_some(&*believed);
-            match port.receive(tick, &mut self.arrived) {
+        let heard = self.robot_states.iter_mut().zip(&mut self.next_state_tick);
+        let ports = self.robot_state_ports.iter_mut().zip(heard).zip(hands);
+        for ((port, (believed, next_tick)), &hands) in ports {
+            let last = (*next_tick > 0).then_some(&*believed);
+            let received = port.receive(tick, &mut self.arrived);
+            if matches!(received, Ok(()) | Err(TickError::NotFinite { .. })) {
+                *next_tick = tick + 1;
+            }
+            match received {
                 Ok(()) if is_credible(&self.arrived.payload, last, hands) => *believed = self.arrived.payload,
                 // The last good one serves until the team has stopped; what it wished then it may not wish now.
                 Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => {
                     believed.flags = flag::INPUT_REJECTED | flag::CAN_STOP | flag::READY_TO_STEP;
                 }
                 Ok(()) => return Err(TickError::Service("a robot says what can't be")),
+                // It is taken to be where it was last seen.
+                Err(TickError::InputMissing { .. }) if tick > 0 => believed.flags |= flag::INPUT_MISSING,
                 Err(error) => return Err(error),
             }
         }
@@ -69,7 +79,9 @@ impl<T: Transport> CoordinatorParticipant<T> {
         let outputs = of_tick(&mut self.outputs, tick)?;
         self.coordinator
             .tick(tick, &mut self.state, &mut self.scratch, robots, outputs)
-            .map_err(|error| TickError::Service(error.text()))
+            .map_err(|error| TickError::Service(error.text()))?;
+        outputs.team_state.next_state_tick = self.next_state_tick;
+        Ok(())
     }
 }
 
@@ -105,7 +117,8 @@ impl<T: Transport> CoordinatorParticipant<T> {
         let robots = self.command_ports.len();
         let state = bytemuck::bytes_of_mut(&mut self.state);
         let heard = bytemuck::cast_slice_mut(&mut self.robot_states);
-        [state, heard]
+        let next_state_tick = bytemuck::cast_slice_mut(&mut self.next_state_tick);
+        [state, heard, next_state_tick]
             .into_iter()
             .chain(self.outputs.iter_mut().flat_map(move |outputs| outputs.parts(robots)))
     }
@@ -126,7 +139,7 @@ impl<T: Transport> Replaceable for CoordinatorParticipant<T> {
 
     fn state_bytes(&self) -> usize {
         let of_tick = self.command_ports.len() * size_of::<TeamCommand>() + size_of::<TeamState>();
-        let heard = size_of_val(&*self.robot_states);
+        let heard = size_of_val(&*self.robot_states) + size_of_val(&self.next_state_tick);
         size_of::<CoordinatorState>() + heard + self.outputs.len() * of_tick
     }
 

@@ -112,7 +112,11 @@ impl Safety {
             for (cause, ticks) in stop_cause::ALL.into_iter().zip(lasted) {
                 *ticks =
                     if self.is_wrong(cause, robot, hands, shall_hold) { ticks.saturating_add(1) } else { 0 };
-                let patience = if cause == stop_cause::TORQUE { self.torque_ticks } else { PATIENCE_TICKS };
+                let patience = match cause {
+                    stop_cause::TORQUE => self.torque_ticks,
+                    stop_cause::STALE => self.limits.stale_limit_ticks,
+                    _ => PATIENCE_TICKS,
+                };
                 if *ticks >= patience && first.is_none() {
                     first = Some((cause, index as u64 + 1));
                 }
@@ -147,6 +151,7 @@ impl Safety {
             stop_cause::TILT => tilt(robot) > limits.tilt_max_rad,
             stop_cause::TORQUE => robot.flags & flag::TORQUE_LIMIT != 0,
             stop_cause::GRASP => shall_hold && robot.holding_hands != all_hands(hands),
+            stop_cause::STALE => robot.flags & flag::INPUT_MISSING != 0,
             _ => false,
         }
     }
@@ -241,6 +246,8 @@ mod tests {
         }
         let torque = |robot: &mut RobotState| robot.flags |= flag::TORQUE_LIMIT;
         assert_eq!(stopped_at(torque), Some((109, stop_cause::TORQUE, 2)));
+        let stale = |robot: &mut RobotState| robot.flags |= flag::INPUT_MISSING;
+        assert_eq!(stopped_at(stale), Some((24, stop_cause::STALE, 2)));
         const { assert!(PATIENCE_TICKS < 20) };
     }
 

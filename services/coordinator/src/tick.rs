@@ -52,7 +52,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 2;
+pub(crate) const STATE_VERSION: u64 = 3;
 
 /// All that matters between ticks.
 #[repr(C)]

@@ -8,7 +8,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_resolution::{read_run, read_spec, tick_schedule};
 use mikoshi_runtime::{
-    Entry, IceoryxTransport, Member, OnMissingRight, RealTime, Replaceable, Role, TickError, WaitPolicy,
+    Clock, Entry, IceoryxTransport, Member, OnMissingRight, RealTime, Replaceable, Role, TickError, WaitPolicy,
     run_service,
 };
 use std::path::{Path, PathBuf};
@@ -23,6 +23,9 @@ pub struct Place {
     /// Take over from the process that is in charge, once ready to
     #[arg(long)]
     replace: bool,
+    /// Take over from the process that is in charge, once that is lost or falls behind
+    #[arg(long, conflicts_with = "replace")]
+    standby: bool,
     /// Description of the run, if it is to be another than the run began with
     #[arg(long, value_name = "FILE")]
     spec: Option<PathBuf>,
@@ -110,13 +113,17 @@ fn try_serve<P: Replaceable>(
     let real_time = RealTime {
         core,
         fifo_priority: run.scenario.placement.fifo_priority,
-        lock_memory: false,
+        lock_memory: matches!(schedule.clock(), Clock::Wall { .. }),
         on_missing_right: OnMissingRight::Warn,
     };
     for missing in real_time.apply().map_err(ServeError::fault)? {
         eprintln!("warning: {missing}");
     }
-    let entry = if place.replace { Entry::Replace } else { Entry::Vacant };
+    let entry = match (place.replace, place.standby) {
+        (true, _) => Entry::Replace,
+        (_, true) => Entry::Standby,
+        _ => Entry::Vacant,
+    };
     let member = Member::join(directory, Role::Service(service), WaitPolicy::default(), entry);
     let member = member.map_err(ServeError::fault)?;
     let transport = IceoryxTransport::open(directory, member, &schedule).map_err(ServeError::fault)?;
@@ -124,7 +131,7 @@ fn try_serve<P: Replaceable>(
     match run_service(&schedule, &mut participant, &transport, run.ticks) {
         Ok(_) => Ok(()),
         // Neither is a fault of this service.
-        Err(fault) if matches!(fault.error, TickError::Stopped | TickError::Retired) => Ok(()),
+        Err(fault) if matches!(fault.error, TickError::Stopped | TickError::Retired | TickError::Fenced) => Ok(()),
         Err(fault) => Err(ServeError::fault(fault)),
     }
 }

@@ -93,6 +93,11 @@ pub(crate) struct LegTargets {
 }
 
 impl Legs {
+    /// How long the parts of a step last.
+    pub(crate) fn timing(&self) -> &StepTiming {
+        &self.gait.config().timing
+    }
+
     /// Of robot `index` of this run, which stands as `kinematics` says with its base at `X_WB`; and their state at tick 0.
     pub(crate) fn new(
         run: &RunSpec,

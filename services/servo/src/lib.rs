@@ -8,6 +8,7 @@
 
 #![allow(non_snake_case)]
 
+mod coast;
 mod credible;
 mod legs;
 mod participant;

@@ -2,7 +2,7 @@
 
 use crate::robot::BuildRobotError;
 use crate::tick::{STATE_VERSION, Servo, ServoScratch, ServoState};
-use bytemuck::Zeroable;
+use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, TeamCommand, flag};
 use mikoshi_runtime::{
@@ -29,16 +29,27 @@ pub struct ServoParticipant<T: Transport> {
     coordination_delay_ticks: u64,
     sensors: Frame<Sensors>,
     arrived: Frame<TeamCommand>,
-    /// The last that could be used.
+    /// The last that could be used, led on where newer ones could not.
     command: TeamCommand,
-    /// 1 if the last command could not.
-    command_rejected: u64,
+    heard: Heard,
     robot_state: RobotState,
     joint_command: JointCommand,
     sensor_port: T::Subscriber<Sensors>,
     command_port: T::Subscriber<TeamCommand>,
     state_port: T::Publisher<RobotState>,
     joint_port: T::Publisher<JointCommand>,
+}
+
+/// What the servo knows of the team's commands.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Heard {
+    /// One past the tick of the last that has arrived; 0 before the first.
+    next_tick: u64,
+    /// One past the tick of the last that could be used.
+    next_usable_tick: u64,
+    /// What the robot says of it in its next state: bits of [`flag`].
+    flags: u64,
 }
 
 impl<T: Transport> ServoParticipant<T> {
@@ -60,7 +71,7 @@ impl<T: Transport> ServoParticipant<T> {
             sensors: Frame::zeroed(),
             arrived: Frame::zeroed(),
             command: TeamCommand::zeroed(),
-            command_rejected: 0,
+            heard: Heard::zeroed(),
             robot_state: RobotState::zeroed(),
             joint_command: JointCommand::zeroed(),
             sensor_port: transport.subscriber(index)?,
@@ -71,50 +82,66 @@ impl<T: Transport> ServoParticipant<T> {
     }
 
     fn sense(&mut self, tick: u64) -> Result<(), TickError> {
-        let mut rejected = core::mem::take(&mut self.command_rejected);
+        let mut flags = core::mem::take(&mut self.heard.flags);
         let received = self.sensor_port.receive(tick, &mut self.sensors);
         let sensors = &self.sensors.payload;
         match received {
             Ok(()) if self.servo.believes(sensors) => {
-                rejected |= sensors.command_rejected;
+                flags |= if sensors.command_rejected != 0 { flag::INPUT_REJECTED } else { 0 };
                 self.robot_state = RobotState::zeroed();
                 self.servo.sense(&mut self.state, &mut self.scratch, sensors, &mut self.robot_state);
             }
             Ok(()) | Err(TickError::NotFinite { .. }) if tick > 0 => {
-                rejected = 1;
+                flags |= flag::INPUT_REJECTED;
                 self.servo.sense_nothing(&mut self.state, &mut self.robot_state);
             }
             Ok(()) => return Err(TickError::Service("the sensors say what can't be")),
             Err(error) => return Err(error),
         }
-        if rejected != 0 {
-            self.robot_state.flags |= flag::INPUT_REJECTED;
-        }
+        self.robot_state.flags |= flags;
         Ok(())
     }
 
     fn act(&mut self, tick: u64) -> Result<(), TickError> {
         // In the first ticks of a delayed coordination there is no command yet: the servo holds.
-        let first = self.coordination_delay_ticks;
-        let command = match tick.checked_sub(first) {
-            Some(command_tick) => {
-                let received = self.command_port.receive(command_tick, &mut self.arrived);
-                let (arrived, last) = (&self.arrived.payload, (tick > first).then_some(&self.command));
-                match received {
-                    Ok(()) if self.servo.accepts(arrived, last, &self.robot_state) => self.command = *arrived,
-                    // Said in the next state.
-                    Ok(()) | Err(TickError::NotFinite { .. }) if tick > first => self.command_rejected = 1,
-                    Ok(()) => return Err(TickError::Service("the coordinator asks for what can't be")),
-                    Err(error) => return Err(error),
-                }
-                Some(&self.command)
-            }
-            None => None,
-        };
+        if let Some(command_tick) = tick.checked_sub(self.coordination_delay_ticks) {
+            self.hear(command_tick)?;
+        }
+        let command = (self.heard.next_usable_tick > 0).then_some(&self.command);
         self.joint_command = JointCommand::zeroed();
         self.servo
             .act(&mut self.state, &mut self.scratch, command, &mut self.joint_command)
-            .map_err(|error| TickError::Service(error.text()))
+            .map_err(|error| TickError::Service(error.text()))?;
+        self.joint_command.next_team_command_tick = self.heard.next_tick;
+        Ok(())
+    }
+
+    /// Hears the command of this tick. Where it can't be used or does not come, the last one is led on; the
+    /// robot says so in its next state.
+    fn hear(&mut self, command_tick: u64) -> Result<(), TickError> {
+        let received = self.command_port.receive(command_tick, &mut self.arrived);
+        let has_arrived = matches!(received, Ok(()) | Err(TickError::NotFinite { .. }));
+        if has_arrived {
+            self.heard.next_tick = command_tick + 1;
+        }
+        let arrived = &self.arrived.payload;
+        let last = (self.heard.next_usable_tick > 0).then_some(&self.command);
+        let problem = match received {
+            Ok(()) if self.servo.accepts(arrived, last, &self.robot_state) => {
+                self.command = *arrived;
+                self.heard.next_usable_tick = command_tick + 1;
+                return Ok(());
+            }
+            Ok(()) | Err(TickError::NotFinite { .. }) if last.is_some() => flag::INPUT_REJECTED,
+            Ok(()) => return Err(TickError::Service("the coordinator asks for what can't be")),
+            Err(TickError::InputMissing { .. }) => flag::INPUT_MISSING,
+            Err(error) => return Err(error),
+        };
+        self.heard.flags |= problem;
+        if last.is_some() {
+            self.servo.lead_on(&mut self.command);
+        }
+        Ok(())
     }
 
     /// What a checkpoint holds as it is: outputs, and the command that may serve again.
@@ -123,7 +150,7 @@ impl<T: Transport> ServoParticipant<T> {
             bytemuck::bytes_of_mut(&mut self.robot_state),
             bytemuck::bytes_of_mut(&mut self.joint_command),
             bytemuck::bytes_of_mut(&mut self.command),
-            bytemuck::bytes_of_mut(&mut self.command_rejected),
+            bytemuck::bytes_of_mut(&mut self.heard),
         ]
     }
 }
@@ -152,7 +179,7 @@ impl<T: Transport> Participant for ServoParticipant<T> {
 
 /// What a checkpoint begins with.
 const PLAIN_BYTES: usize =
-    size_of::<RobotState>() + size_of::<JointCommand>() + size_of::<TeamCommand>() + size_of::<u64>();
+    size_of::<RobotState>() + size_of::<JointCommand>() + size_of::<TeamCommand>() + size_of::<Heard>();
 
 impl<T: Transport> Replaceable for ServoParticipant<T> {
     fn state_schema(&self) -> u64 {

@@ -1,6 +1,7 @@
 //! One robot's tick, in two halves: `sense` says where it is, `act` says where it goes. No allocation,
 //! no clock, no I/O, no panic path.
 
+use crate::coast;
 use crate::credible;
 use crate::legs::{Felt, HandReference, Legs, LegsState};
 use crate::robot::{BuildRobotError, Robot};
@@ -30,12 +31,13 @@ const HAND_TOLERANCE_M: f64 = 0.005;
 pub struct Servo {
     robot: Robot,
     legs: Legs,
+    period_s: f64,
     initial: ServoState,
 }
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 3;
+pub(crate) const STATE_VERSION: u64 = 4;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,7 +116,7 @@ impl Servo {
             flags: 0,
             closed_hands: if run.scenario.begins_closed() { all_hands(robot.palms.len()) } else { 0 },
         };
-        Ok(Self { robot, legs, initial })
+        Ok(Self { robot, legs, period_s: run.scenario.control_period_s, initial })
     }
 
     /// The state at tick 0.
@@ -141,6 +143,12 @@ impl Servo {
     ) -> bool {
         let is_clock = StepClock::from_words(command.step_clock).is_some();
         is_clock && credible::is_credible(command, last, robot, self.robot.palms.len())
+    }
+
+    /// Leads a command on by a tick that nobody has commanded: a step is finished and no other begun, hands
+    /// coast to rest.
+    pub(crate) fn lead_on(&self, command: &mut TeamCommand) {
+        coast::lead_on(command, self.legs.timing(), self.period_s);
     }
 
     /// Workspaces of its size.
@@ -293,7 +301,6 @@ impl Servo {
         out.joint_velocity_ref_rad_s = state.ik.joint_velocity;
         state.closed_hands = command.map_or(state.closed_hands, |command| command.closed_hands);
         out.closed_hands = state.closed_hands;
-        out.team_command_tick = command.map_or(0, |command| command.state_tick);
         Ok(())
     }
 

@@ -66,7 +66,7 @@ pub fn constant_commands(run: &RunSpec) -> Vec<JointCommand> {
             joint_position_ref_rad: [0.0; MAX_JOINTS],
             joint_velocity_ref_rad_s: [0.0; MAX_JOINTS],
             closed_hands: (1 << robot.grasping_hands.len()) - 1,
-            team_command_tick: 0,
+            next_team_command_tick: 0,
         };
         command.joint_position_ref_rad[..robot.initial_posture_rad.len()]
             .copy_from_slice(&robot.initial_posture_rad);

@@ -11,6 +11,7 @@ use super::{
 use crate::board::{Role, State};
 use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
 use crate::member::{Member, TAP_LEAD_TICKS};
+use crate::pace::Pace;
 use crate::shared_memory::populate;
 use crate::wait::Reason;
 use crate::{Domain, DomainError, Position, Replaceable, Session, TickError, TickSchedule, Topic};
@@ -28,16 +29,18 @@ use rustix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// Processes that may publish a topic at a time: the one in charge, a standby, and a predecessor that
-/// is frozen and still holds its place.
-const MAX_PUBLISHERS: usize = 3;
+/// Processes that may publish a topic at a time: the one in charge, a standby, one that is to be swapped in, and
+/// two predecessors that are frozen and still hold their places.
+const MAX_PUBLISHERS: usize = 5;
 /// Processes that may wait for a topic at a time, for the same reasons. By the schedule a topic has at
 /// most one service that waits for it.
-const MAX_CONSUMERS: usize = 3;
+const MAX_CONSUMERS: usize = MAX_PUBLISHERS;
 /// The tap, and its successor if it is frozen.
 const MAX_TAPS: usize = 2;
 /// Whoever has a port, and somebody who looks.
 const MAX_NODES: usize = MAX_PUBLISHERS + MAX_CONSUMERS + MAX_TAPS + 2;
+/// Who speaks of a later tick is not believed.
+const FURTHEST_TICKS: u64 = 100_000;
 /// Frames are copied out of shared memory at once.
 const MAX_BORROWED: usize = 1;
 /// A frame is filled and sent before the next is loaned.
@@ -88,6 +91,10 @@ pub(super) struct Process {
     node: Node<ipc::Service>,
     member: Member,
     schedule: TickSchedule,
+    /// Where ticks are paced by the clock.
+    pace: Option<Pace>,
+    /// When the inputs of the current phase are due.
+    due_ns: Cell<Option<u64>>,
     run: PathBuf,
     domain: Domain,
     ports: Ports,
@@ -127,7 +134,12 @@ impl Process {
         let to_connect = ports.clone();
         member.on_successor(move || to_connect.connect());
         let run = run.to_path_buf();
-        Ok(Rc::new(Self { node, member, schedule: schedule.clone(), run, domain, ports }))
+        let pace = match member.role() {
+            Role::Service(service) => Pace::of(schedule, service),
+            Role::Supervisor | Role::Tap => None,
+        };
+        let (schedule, due_ns) = (schedule.clone(), Cell::new(None));
+        Ok(Rc::new(Self { node, member, schedule, pace, due_ns, run, domain, ports }))
     }
 
     fn service<P: Payload>(&self, topic: Topic) -> Result<Factory<P>, ConnectError> {
@@ -239,13 +251,18 @@ impl IceoryxTransport {
     /// Takes the place of a predecessor, once that has made room. Whatever a successor can do before is
     /// done while the other is in charge; what it can't load it refuses to replace.
     fn succeed(&self, participant: &mut impl Replaceable) -> Result<Option<Position>, TickError> {
-        let Process { member, .. } = &*self.process;
+        let Process { member, pace, .. } = &*self.process;
         self.process.connect();
         self.process.touch()?;
         self.load_latest(participant)?;
-        member.wait_for_vacancy()?;
-        let kept = self.load_latest(participant)?;
-        member.take_charge(kept.unwrap_or_default()).map_err(|_| TickError::Fenced)?;
+        let frozen = member.wait_for_vacancy(pace.as_ref())?;
+        let mut kept = self.load_latest(participant)?;
+        member.take_charge(kept.unwrap_or_default(), frozen).map_err(|_| TickError::Fenced)?;
+        if frozen.is_some() {
+            // It may have thawed, and kept and published another phase before it was fenced.
+            kept = self.load_latest(participant)?;
+            member.slot().set_since(kept.unwrap_or_default());
+        }
         member.wait_for_welcome()?;
         Ok(kept)
     }
@@ -277,9 +294,16 @@ impl Session for IceoryxTransport {
     }
 
     fn begin_phase(&self, at: Position) -> Result<(), TickError> {
-        self.process.member.begin_phase(at)?;
-        if self.opens_tick && at.phase == 0 {
-            self.process.member.wait_for_tap((at.tick + 1).saturating_sub(TAP_LEAD_TICKS))?;
+        let Process { member, pace, due_ns, .. } = &*self.process;
+        member.begin_phase(at)?;
+        let opens_tick = self.opens_tick && at.phase == 0;
+        match pace {
+            Some(pace) if opens_tick => member.begin_tick(pace, at.tick),
+            Some(pace) => {
+                due_ns.set(member.board().origin_ns().and_then(|origin_ns| pace.due_ns(origin_ns, at)));
+            }
+            None if opens_tick => member.wait_for_tap((at.tick + 1).saturating_sub(TAP_LEAD_TICKS))?,
+            None => {}
         }
         Ok(())
     }
@@ -355,6 +379,7 @@ impl Transport for IceoryxTransport {
             from,
             phase,
             arrived: Box::new(Frame::zeroed()),
+            early: None,
         })
     }
 
@@ -435,25 +460,45 @@ pub struct IceoryxSubscriber<P: Payload> {
     phase: usize,
     /// Where frames are copied to before they are looked at: shared memory may change under the eyes.
     arrived: Box<Frame<P>>,
+    /// The tick of what has arrived, if that came before its time.
+    early: Option<u64>,
 }
 
 impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
-        let Self { process, port, topic, reason, from, phase, arrived } = self;
+        let Self { process, port, topic, reason, from, phase, arrived, early } = self;
+        let (topic, due_ns) = (*topic, process.due_ns.get());
+        let missing = TickError::InputMissing { topic, tick };
+        // By the clock one goes on without what was lost, and uses what follows in its turn.
+        if early.is_some_and(|found| found > tick) {
+            return Err(missing);
+        }
         let slot = process.member.board().slots().get(*from);
-        let slot = slot.ok_or(TickError::TransportFailed { topic: *topic })?;
-        process.member.wait_for(*reason, || {
-            while let Some(sample) =
-                port.receive().map_err(|_| TickError::TransportFailed { topic: *topic })?
-            {
+        let slot = slot.ok_or(TickError::TransportFailed { topic })?;
+        if early.take() == Some(tick) && judge(arrived, topic, *phase, slot.charge(), tick)? == Verdict::Use {
+            *frame = **arrived;
+            return Ok(());
+        }
+        let found = process.member.wait_until(*reason, due_ns, || {
+            while let Some(sample) = port.receive().map_err(|_| TickError::TransportFailed { topic })? {
                 **arrived = *sample.payload();
                 drop(sample);
-                if judge(arrived, *topic, *phase, slot.charge(), tick)? == Verdict::Use {
-                    return Ok(Some(()));
+                match judge(arrived, topic, *phase, slot.charge(), tick) {
+                    Ok(Verdict::Use) => return Ok(Some(())),
+                    Ok(Verdict::PassOver) => {}
+                    Err(TickError::FutureTick { found, .. }) if process.pace.is_some() => {
+                        // Nobody is so far ahead who counts as we do.
+                        if found - tick <= FURTHEST_TICKS {
+                            *early = Some(found);
+                            return Err(missing);
+                        }
+                    }
+                    Err(error) => return Err(error),
                 }
             }
             Ok(None)
         })?;
+        found.ok_or(missing)?;
         *frame = **arrived;
         Ok(())
     }

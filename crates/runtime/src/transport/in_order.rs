@@ -57,6 +57,38 @@ impl<O: Observer<P>, P: Payload> InOrder<O, P> {
         Ok(false)
     }
 
+    /// Takes in all that has come, and returns the latest tick of it, if there is any.
+    ///
+    /// # Errors
+    /// As [`Observer::try_receive`].
+    pub fn gather(&mut self) -> Result<Option<u64>, TickError> {
+        let mut frame = Frame::zeroed();
+        while self.observer.try_receive(&mut frame)? {
+            let tick = frame.envelope.tick;
+            if tick >= self.next_tick {
+                self.early.entry(tick).or_insert_with(|| Box::new(frame));
+            }
+        }
+        Ok(self.early.last_key_value().map(|(tick, _)| *tick))
+    }
+
+    /// Whether the frame of this tick has been gathered.
+    pub fn has(&self, tick: u64) -> bool {
+        self.early.contains_key(&tick)
+    }
+
+    /// Hands out the gathered frame of this tick, if there is one; those before it are given up.
+    pub fn take(&mut self, tick: u64, frame: &mut Frame<P>) -> bool {
+        self.next_tick = self.next_tick.max(tick + 1);
+        let later = self.early.split_off(&self.next_tick);
+        let earlier = core::mem::replace(&mut self.early, later);
+        let found = earlier.get(&tick);
+        if let Some(found) = found {
+            *frame = **found;
+        }
+        found.is_some()
+    }
+
     fn is_next(&mut self, frame: &Frame<P>) -> bool {
         let tick = frame.envelope.tick;
         if tick > self.next_tick {
@@ -86,6 +118,17 @@ mod tests {
         fn receive(&mut self, frame: &mut Frame<ObjectTruth>) -> Result<bool, TickError> {
             self.try_receive(frame)
         }
+    }
+
+    #[test]
+    fn what_was_lost_is_given_up_and_what_follows_comes_in_its_turn() {
+        let mut frames = InOrder::new(Script(vec![0, 3, 2, 3, 5].into()));
+        assert_eq!(frames.gather(), Ok(Some(5)));
+        let mut frame = Frame::zeroed();
+        let mut take = |tick| frames.take(tick, &mut frame).then_some(frame.envelope.tick);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(&mut take), [Some(0), None, Some(2), Some(3), None, Some(5)]);
+        assert_eq!(take(3), None, "its turn is over");
+        assert_eq!(frames.gather(), Ok(None));
     }
 
     #[test]

@@ -33,17 +33,24 @@ pub mod memory;
 
 pub use in_order::InOrder;
 
-use crate::{TickError, TickSchedule, Topic};
+use crate::{Clock, TickError, TickSchedule, Topic};
 use mikoshi_ipc_types::{Frame, Payload, ServiceId, ServicePayload};
 
 /// Ticks that an observer may fall behind before it loses frames.
 pub const OBSERVER_DEPTH: usize = 64;
 
+/// Ticks that go by in wall-clock time until a successor is there, and which it then makes up for.
+const BACKLOG: usize = 32;
+
 /// Frames that a consumer's queue holds: one of each tick up to the age that it uses, the next, and two
 /// by a successor that repeats what its predecessor may have said.
 fn consumer_depth(schedule: &TickSchedule, topic: Topic) -> usize {
     let oldest = schedule.consumers_of(topic).map(|(_, input)| input.age_ticks).max().unwrap_or(0);
-    oldest as usize + 4
+    let backlog = match schedule.clock() {
+        Clock::Lockstep => 0,
+        Clock::Wall { .. } => BACKLOG,
+    };
+    oldest as usize + 4 + backlog
 }
 
 /// The ports of one service.

@@ -15,7 +15,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Observation, TeamTap};
-use mikoshi_runtime::{InMemoryHub, InMemoryTransport, Replaceable, run_in_one_thread};
+use mikoshi_runtime::{Clock, InMemoryHub, InMemoryTransport, Replaceable, run_in_one_thread};
 use mikoshi_servo::ServoParticipant;
 use mikoshi_sim_bridge::{BridgeParticipant, BuildBridgeError, world_xml};
 use mujoco_rs::mujoco_version;
@@ -43,7 +43,7 @@ fn execute(
     let (run, hub) = (&prepared.run, InMemoryHub::new(prepared.schedule.clone()));
     let xml = world_xml(run).map_err(Failure::usage)?;
     fs::write(out.world(), xml).map_err(|error| Failure::fault(error).context(out.world().display()))?;
-    let mut team_tap = TeamTap::new(&hub.tap(), run.robots.len()).map_err(Failure::fault)?;
+    let mut team_tap = TeamTap::new(&hub.tap(), run.robots.len(), Clock::Lockstep).map_err(Failure::fault)?;
     let mut participants = match participants(prepared, &hub) {
         Ok(participants) => participants,
         // Whoever looks for the reason needs what there is: the world, for one.

@@ -6,7 +6,7 @@ use crate::gain::GainReport;
 use crate::observer::RunObserver;
 use crate::outcome::Outcome;
 use crate::output_directory::OutputDirectory;
-use crate::prepare::{Prepared, prepare};
+use crate::prepare::{Prepared, prepare_with};
 use crate::print::{print_error, print_out};
 use crate::report::report;
 use mikoshi_config::save_scenario;
@@ -22,7 +22,8 @@ pub fn run(
     arguments: &RunArguments,
     execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
 ) -> Result<Status, Failure> {
-    let prepared = prepare(&arguments.scenario)?;
+    let by_the_clock = [("clock".to_owned(), "wall".to_owned())];
+    let prepared = prepare_with(&arguments.scenario, if arguments.real_time { &by_the_clock } else { &[] })?;
     let scenario = &prepared.run.scenario;
     if let Some(warning) = scenario.is_controlled().then(|| GainReport::of(&prepared).warning()).flatten() {
         print_error(&as_lines("warning", &warning));

@@ -1,0 +1,99 @@
+//! Wall-clock time: when ticks begin, and when their phases are due.
+
+use crate::{Clock, Phase, Position, TickSchedule};
+use mikoshi_ipc_types::ServiceId;
+use rustix::time::{ClockId, Timespec, clock_gettime};
+
+const NS_PER_S: u64 = 1_000_000_000;
+
+/// Nanoseconds on the machine's monotonic clock.
+pub(crate) fn now_ns() -> u64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
+}
+
+/// Sleeps until this time, and not at all if it has passed.
+pub(crate) fn sleep_until(due_ns: u64) {
+    let due = Timespec { tv_sec: (due_ns / NS_PER_S) as i64, tv_nsec: (due_ns % NS_PER_S) as i64 };
+    while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &due) == Err(rustix::io::Errno::INTR) {}
+}
+
+/// When the phases of one service are due.
+#[derive(Clone, Debug)]
+pub(crate) struct Pace {
+    pub period_ns: u64,
+    /// By phase, from the beginning of its tick; none where it waits for the tick itself.
+    due_ns: Vec<Option<u64>>,
+    /// In the first ticks nobody is late.
+    first_due_tick: u64,
+}
+
+impl Pace {
+    /// Of this service; none in lockstep.
+    pub fn of(schedule: &TickSchedule, service: ServiceId) -> Option<Self> {
+        let Clock::Wall { period_ns } = schedule.clock() else { return None };
+        let due_ns = |phase: &Phase| {
+            // What opens the tick says when it is.
+            let waits_for_others = phase.inputs.iter().any(|input| Some(input.from) != schedule.opener());
+            waits_for_others.then(|| (schedule.latest_start(phase) * period_ns as f64) as u64)
+        };
+        let ages = schedule.phases().iter().flat_map(|phase| &phase.inputs).map(|input| input.age_ticks);
+        Some(Self {
+            period_ns,
+            due_ns: schedule.phases_of(service).map(due_ns).collect(),
+            first_due_tick: ages.max().unwrap_or(0) + 1,
+        })
+    }
+
+    /// When the inputs of this phase are due in a run whose tick 0 began at `origin_ns`.
+    pub fn due_ns(&self, origin_ns: u64, at: Position) -> Option<u64> {
+        let due_ns = self.due_ns.get(at.phase).copied().flatten()?;
+        (at.tick >= self.first_due_tick).then(|| self.start_ns(origin_ns, at.tick).saturating_add(due_ns))
+    }
+
+    /// When this tick begins.
+    pub fn start_ns(&self, origin_ns: u64, tick: u64) -> u64 {
+        origin_ns.saturating_add(tick.saturating_mul(self.period_ns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Placement;
+
+    const PERIOD_NS: u64 = 5_000_000;
+
+    fn pace_of(service: ServiceId) -> Pace {
+        let schedule = TickSchedule::of_team(2, 1, &Placement::default()).expect("a valid team");
+        let schedule = schedule.with_clock(Clock::Wall { period_ns: PERIOD_NS });
+        Pace::of(&schedule, service).expect("it is paced")
+    }
+
+    #[test]
+    fn in_lockstep_nothing_is_due() {
+        let schedule = TickSchedule::of_team(2, 1, &Placement::default()).expect("a valid team");
+        assert!(Pace::of(&schedule, ServiceId::Bridge).is_none());
+    }
+
+    #[test]
+    fn phases_are_due_a_share_of_the_period_after_their_tick_began() {
+        let at = |phase| Position { tick: 10, phase };
+        let begun_ns = 7 + 10 * PERIOD_NS;
+        let bridge = pace_of(ServiceId::Bridge);
+        assert_eq!(bridge.start_ns(7, 10), begun_ns);
+        assert_eq!(bridge.due_ns(7, at(0)), None);
+        assert_eq!(bridge.due_ns(7, at(1)), Some(begun_ns + PERIOD_NS / 2));
+        let servo = pace_of(ServiceId::Servo(1));
+        assert_eq!(servo.due_ns(7, at(0)), None, "the sensors are the tick");
+        assert_eq!(servo.due_ns(7, at(1)), Some(begun_ns + PERIOD_NS / 4));
+    }
+
+    #[test]
+    fn in_the_first_ticks_nobody_is_late() {
+        let bridge = pace_of(ServiceId::Bridge);
+        let due = |tick| bridge.due_ns(0, Position { tick, phase: 1 });
+        assert_eq!([due(0), due(1)], [None, None]);
+        assert!(due(2).is_some());
+    }
+}
