@@ -115,7 +115,9 @@ impl<T: Transport> BridgeParticipant<T> {
                     *command = JointCommand { joint_velocity_ref_rad_s: [0.0; MAX_JOINTS], ..*last };
                     rejected |= 1 << robot;
                 }
-                Err(TickError::InputMissing { .. }) => *command = self.coast.after(last),
+                Err(TickError::InputMissing { .. }) => {
+                    *command = self.coast.after(last, (tick + 1).saturating_sub(*next_tick));
+                }
                 Err(error) => return Err(error),
             }
         }

@@ -67,6 +67,40 @@ pub(crate) struct Bed {
     sleeper: AtomicU32,
 }
 
+/// Whoever looks at its watch so much too late did not run, and perhaps nobody could.
+const OVERSLEPT_NS: u64 = 500_000;
+/// What is then still waited for.
+const GRACE_NS: u64 = 2_000_000;
+
+/// Until when something is waited for.
+struct Patience {
+    due_ns: Option<u64>,
+    /// When it was looked last.
+    looked_ns: u64,
+    has_grace: bool,
+}
+
+impl Patience {
+    fn until(due_ns: Option<u64>, now_ns: u64) -> Self {
+        Self { due_ns, looked_ns: now_ns, has_grace: true }
+    }
+
+    /// Whether it is over. If between two looks nobody may have run, it lasts a little longer, once.
+    fn is_over(&mut self, now_ns: u64) -> bool {
+        let Some(due_ns) = self.due_ns else { return false };
+        let was_early = core::mem::replace(&mut self.looked_ns, now_ns) < due_ns;
+        if was_early && now_ns > due_ns.saturating_add(OVERSLEPT_NS) && core::mem::take(&mut self.has_grace) {
+            self.due_ns = Some(now_ns.saturating_add(GRACE_NS));
+            return false;
+        }
+        now_ns >= due_ns
+    }
+
+    fn left_ns(&self, now_ns: u64) -> u64 {
+        self.due_ns.map_or(u64::MAX, |due_ns| due_ns.saturating_sub(now_ns))
+    }
+}
+
 /// Why a sleep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Woken {
@@ -94,11 +128,11 @@ impl Bed {
         if let Some(value) = poll()? {
             return Ok(Some(value));
         }
-        let is_due = |now_ns: u64| due_ns.is_some_and(|due_ns| now_ns >= due_ns);
         let start_ns = now_ns();
+        let mut patience = Patience::until(due_ns, start_ns);
         let end_ns = start_ns.saturating_add(policy.yield_for.as_nanos() as u64);
         let mut time_ns = start_ns;
-        while time_ns < end_ns && !is_due(time_ns) {
+        while time_ns < end_ns && !patience.is_over(time_ns) {
             rustix::thread::sched_yield();
             if let Some(value) = poll()? {
                 return Ok(Some(value));
@@ -106,12 +140,12 @@ impl Bed {
             time_ns = now_ns();
         }
         let word = sleeper.to_word();
-        while !is_due(time_ns) {
+        while !patience.is_over(time_ns) {
             self.sleeper.store(word, Ordering::Relaxed);
             fence(Ordering::SeqCst);
             let ticket = self.ticket.load(Ordering::Relaxed);
             let last_look = poll();
-            let left_ns = due_ns.map_or(SLEEP_NS, |due_ns| due_ns.saturating_sub(now_ns()).min(SLEEP_NS));
+            let left_ns = patience.left_ns(now_ns()).min(SLEEP_NS);
             let woken = if matches!(last_look, Ok(None)) { self.sleep(ticket, left_ns) } else { Woken::Called };
             // By now it may be another one's.
             let _ = self.sleeper.compare_exchange(word, 0, Ordering::Relaxed, Ordering::Relaxed);
@@ -156,5 +190,30 @@ impl Bed {
         self.ticket.fetch_add(1, Ordering::Relaxed);
         // Fails only for an address that is not mapped, and `self` is.
         let _ = futex::wake(&self.ticket, futex::Flags::empty(), u32::MAX >> 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn patience_ends_when_it_is_due() {
+        let mut patience = Patience::until(Some(10 * MS), 0);
+        assert!(!patience.is_over(10 * MS - 1));
+        assert!(patience.is_over(10 * MS));
+        assert!(Patience::until(Some(10 * MS), 11 * MS).is_over(11 * MS), "it was over when it began");
+        assert!(!Patience::until(None, 0).is_over(u64::MAX));
+    }
+
+    #[test]
+    fn who_overslept_waits_a_little_longer_once() {
+        let mut patience = Patience::until(Some(10 * MS), 0);
+        assert!(!patience.is_over(17 * MS));
+        assert_eq!(patience.left_ns(18 * MS), MS);
+        assert!(!patience.is_over(18 * MS));
+        assert!(patience.is_over(30 * MS));
     }
 }
