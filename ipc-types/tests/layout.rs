@@ -2,8 +2,9 @@
 //! understand each other: that is what their schema hashes say.
 
 use mikoshi_ipc_types::{
-    Audience, Envelope, Field, Frame, JointCommand, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS, MAX_ROBOTS,
-    ObjectTruth, Payload, RobotState, RobotTruth, Scalar, Sensors, TeamCommand, TeamState, schema_hash,
+    Audience, Envelope, Field, Frame, JointCommand, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS,
+    MAX_ROBOTS, ObjectTruth, Payload, RobotState, RobotTruth, Scalar, Sensors, TeamCommand, TeamState,
+    schema_hash,
 };
 
 /// Asks the same of every payload.

@@ -1,6 +1,6 @@
 //! The bridge on a transport.
 
-use crate::coast::Coast;
+use crate::coast::{Coast, Rates};
 use crate::{BuildWorldError, World};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{
@@ -8,7 +8,7 @@ use mikoshi_ipc_types::{
 };
 use mikoshi_runtime::{
     Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, Transport,
-    state_schema,
+    read_parts, state_schema, write_parts,
 };
 use thiserror::Error;
 
@@ -39,6 +39,8 @@ pub struct BridgeParticipant<T: Transport> {
     commands: Vec<JointCommand>,
     /// One past the tick of the last command of each robot that has arrived; 0 before the first.
     next_command_tick: [u64; MAX_ROBOTS],
+    /// Of each robot, in the tick before the last.
+    rates_before: [Rates; MAX_ROBOTS],
     coast: Coast,
     robots: Vec<RobotPorts<T>>,
     object_truth: T::Publisher<ObjectTruth>,
@@ -69,6 +71,7 @@ impl<T: Transport> BridgeParticipant<T> {
             world: World::new(run)?,
             commands: vec![frame.payload; robots.len()],
             next_command_tick: [0; MAX_ROBOTS],
+            rates_before: [[0.0; MAX_JOINTS]; MAX_ROBOTS],
             coast: Coast::of_period(run.scenario.control_period_s),
             frame,
             robots,
@@ -101,9 +104,9 @@ impl<T: Transport> BridgeParticipant<T> {
 
     fn step(&mut self, tick: u64) -> Result<(), TickError> {
         let mut rejected = 0;
-        let heard = self.commands.iter_mut().zip(&mut self.next_command_tick);
+        let heard = self.commands.iter_mut().zip(&mut self.next_command_tick).zip(&mut self.rates_before);
         let robots = self.robots.iter_mut().zip(heard).zip(self.world.commands());
-        for (robot, ((ports, (command, next_tick)), last)) in robots.enumerate() {
+        for (robot, ((ports, ((command, next_tick), rates_before)), last)) in robots.enumerate() {
             let received = ports.command.receive(tick, &mut self.frame);
             if matches!(received, Ok(()) | Err(TickError::NotFinite { .. })) {
                 *next_tick = tick + 1;
@@ -116,10 +119,12 @@ impl<T: Transport> BridgeParticipant<T> {
                     rejected |= 1 << robot;
                 }
                 Err(TickError::InputMissing { .. }) => {
-                    *command = self.coast.after(last, (tick + 1).saturating_sub(*next_tick));
+                    let missed = (tick + 1).saturating_sub(*next_tick);
+                    *command = self.coast.after(last, rates_before, missed);
                 }
                 Err(error) => return Err(error),
             }
+            *rates_before = last.joint_velocity_ref_rad_s;
         }
         self.world.note_rejected(rejected);
         self.world.step(&self.commands).map_err(|error| TickError::Service(error.text()))
@@ -177,23 +182,31 @@ impl<T: Transport> Replaceable for BridgeParticipant<T> {
     }
 
     fn state_bytes(&self) -> usize {
-        size_of_val(&self.next_command_tick) + self.world.checkpoint_size()
+        size_of_val(&self.next_command_tick) + size_of_val(&self.rates_before) + self.world.checkpoint_size()
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
-        let room = checkpoint.get_mut(..self.state_bytes()).ok_or(TickError::Checkpoint("no room"))?;
-        let (heard, world) = room.split_at_mut(size_of_val(&self.next_command_tick));
-        heard.copy_from_slice(bytemuck::cast_slice(&self.next_command_tick));
-        self.world.save(world).map_err(|_| TickError::Checkpoint("the world can't be saved"))?;
-        Ok(self.state_bytes())
+        let length = write_parts(self.parts(), checkpoint)?;
+        let size = self.world.checkpoint_size();
+        let room = checkpoint.get_mut(length..length + size).ok_or(TickError::Checkpoint("no room"))?;
+        self.world.save(room).map_err(|_| TickError::Checkpoint("the world can't be saved"))?;
+        Ok(length + size)
     }
 
     fn load(&mut self, checkpoint: &[u8]) -> Result<(), TickError> {
-        let (heard, world) = checkpoint
-            .split_at_checked(size_of_val(&self.next_command_tick))
-            .ok_or(TickError::Checkpoint("the state is too short"))?;
+        let length = checkpoint.len().saturating_sub(self.world.checkpoint_size());
+        let (heard, world) = checkpoint.split_at(length);
         self.world.load(world).map_err(|_| TickError::Checkpoint("it is of another world"))?;
-        bytemuck::cast_slice_mut(&mut self.next_command_tick).copy_from_slice(heard);
-        Ok(())
+        read_parts(self.parts(), heard)
+    }
+}
+
+impl<T: Transport> BridgeParticipant<T> {
+    /// What a checkpoint holds beside the world.
+    fn parts(&mut self) -> [&mut [u8]; 2] {
+        [
+            bytemuck::cast_slice_mut(&mut self.next_command_tick),
+            bytemuck::cast_slice_mut(&mut self.rates_before),
+        ]
     }
 }

@@ -1,8 +1,8 @@
 //! A process's place on the board: it waits there for others, and is woken there.
 
 use crate::board::{Board, BoardError, Role, Slot, State};
-use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::pace::{Pace, now_ns, sleep_until};
+use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::wait::{Reason, Sleeper, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
 use core::cell::{Cell, RefCell};
@@ -431,7 +431,8 @@ impl Member {
             return Err(TickError::Stopped);
         }
         let world = ServiceId::Bridge;
-        let Some(index) = self.board.index_of(Role::Service(world)).filter(|index| *index != self.slot) else {
+        let Some(index) = self.board.index_of(Role::Service(world)).filter(|index| *index != self.slot)
+        else {
             return Ok(());
         };
         // Whether it has exited is asked before its state: one that is done says so before it exits.

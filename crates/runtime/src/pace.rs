@@ -15,7 +15,8 @@ pub(crate) fn now_ns() -> u64 {
 /// Sleeps until this time, and not at all if it has passed.
 pub(crate) fn sleep_until(due_ns: u64) {
     let due = Timespec { tv_sec: (due_ns / NS_PER_S) as i64, tv_nsec: (due_ns % NS_PER_S) as i64 };
-    while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &due) == Err(rustix::io::Errno::INTR) {}
+    while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &due) == Err(rustix::io::Errno::INTR) {
+    }
 }
 
 /// When the phases of one service are due.

@@ -314,7 +314,8 @@ impl TickSchedule {
         let mut latest = vec![1.0_f64; self.phases.len()];
         for index in (0..self.phases.len()).rev() {
             let phase = &self.phases[index];
-            let waits_for_it = |input: &&Input| phase.outputs.iter().any(|output| output.topic == input.topic);
+            let waits_for_it =
+                |input: &&Input| phase.outputs.iter().any(|output| output.topic == input.topic);
             let mut end = 1.0_f64;
             for (later, other) in self.phases.iter().enumerate() {
                 for input in other.inputs.iter().filter(waits_for_it) {

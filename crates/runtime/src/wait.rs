@@ -1,7 +1,7 @@
 //! Waiting for another process: yield for a while, then sleep on a futex in shared memory.
 
-use core::sync::atomic::{AtomicU32, Ordering, fence};
 use crate::pace::now_ns;
+use core::sync::atomic::{AtomicU32, Ordering, fence};
 use rustix::event::Timespec;
 use rustix::thread::futex;
 use std::time::Duration;
@@ -146,7 +146,8 @@ impl Bed {
             let ticket = self.ticket.load(Ordering::Relaxed);
             let last_look = poll();
             let left_ns = patience.left_ns(now_ns()).min(SLEEP_NS);
-            let woken = if matches!(last_look, Ok(None)) { self.sleep(ticket, left_ns) } else { Woken::Called };
+            let woken =
+                if matches!(last_look, Ok(None)) { self.sleep(ticket, left_ns) } else { Woken::Called };
             // By now it may be another one's.
             let _ = self.sleeper.compare_exchange(word, 0, Ordering::Relaxed, Ordering::Relaxed);
             if let Some(value) = last_look? {

@@ -20,8 +20,8 @@ use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Fault, Observation, TeamTap};
 use mikoshi_resolution::{world_file, write_run};
 use mikoshi_runtime::{
-    Board, Clock, Domain, Entry, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus, State,
-    TickError, WaitPolicy, required_bytes,
+    Board, Clock, Domain, Entry, FaultCode, IceoryxTap, Member, Position, Role, RunDirectory, SlotStatus,
+    State, TickError, WaitPolicy, required_bytes,
 };
 use std::collections::BTreeSet;
 use std::fs;
@@ -357,8 +357,7 @@ impl Supervisor {
         self.children.look();
         let has_failed =
             |process: &ServiceProcess| process.ended.is_some_and(|ended| !ended.status.success());
-        let others =
-            self.children.processes().iter().filter(|process| !self.lost.contains(&process.service));
+        let others = self.children.processes().iter().filter(|process| !self.lost.contains(&process.service));
         !others.into_iter().any(has_failed)
     }
 

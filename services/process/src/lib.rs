@@ -8,8 +8,8 @@ use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_resolution::{read_run, read_spec, tick_schedule};
 use mikoshi_runtime::{
-    Clock, Entry, IceoryxTransport, Member, OnMissingRight, RealTime, Replaceable, Role, TickError, WaitPolicy,
-    run_service,
+    Clock, Entry, IceoryxTransport, Member, OnMissingRight, RealTime, Replaceable, Role, TickError,
+    WaitPolicy, run_service,
 };
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -131,7 +131,9 @@ fn try_serve<P: Replaceable>(
     match run_service(&schedule, &mut participant, &transport, run.ticks) {
         Ok(_) => Ok(()),
         // Neither is a fault of this service.
-        Err(fault) if matches!(fault.error, TickError::Stopped | TickError::Retired | TickError::Fenced) => Ok(()),
+        Err(fault) if matches!(fault.error, TickError::Stopped | TickError::Retired | TickError::Fenced) => {
+            Ok(())
+        }
         Err(fault) => Err(ServeError::fault(fault)),
     }
 }

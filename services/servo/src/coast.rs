@@ -34,12 +34,8 @@ mod tests {
     const PERIOD_S: f64 = 0.005;
 
     fn walking() -> TeamCommand {
-        let step = StepClock::Stepping {
-            step_index: 3,
-            tick_in_step: 70,
-            swing: Side::Left,
-            will_continue: true,
-        };
+        let step =
+            StepClock::Stepping { step_index: 3, tick_in_step: 70, swing: Side::Left, will_continue: true };
         let mut command = TeamCommand { step_clock: step.to_words(), ..TeamCommand::zeroed() };
         command.hand_pose_ref[0] = [0.3, 0.1, 0.8, 1.0, 0.0, 0.0, 0.0];
         command.hand_twist_ref[0] = [0.05, 0.0, -0.02, 0.0, 0.0, 0.1];
