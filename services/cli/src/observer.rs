@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
-use mikoshi_config::scenario::{Clock, Scenario};
+use mikoshi_config::scenario::Clock;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
     Fault, Figures, Freshness, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
@@ -145,7 +145,7 @@ impl RunObserver {
             timing: Timing {
                 ticks_held: self.freshness.ticks_held(),
                 frames_lost: self.frames_lost,
-                ..self.stamps.timing(scenario)
+                ..self.stamps.timing(scenario.clock, scenario.control_period_s)
             },
             faults: [self.stops.faults, faults].concat(),
             swaps: self.swaps.into_iter().map(count_lost).collect(),
@@ -204,10 +204,10 @@ impl Stamps {
     }
 
     /// All zero where no clock was read; in lockstep nothing is late.
-    fn timing(mut self, scenario: &Scenario) -> Timing {
+    fn timing(mut self, clock: Clock, period_s: f64) -> Timing {
         self.periods_ns.sort_unstable();
-        let late_ns = LATE * scenario.control_period_s * 1e9;
-        let ticks_late = match scenario.clock {
+        let late_ns = LATE * period_s * 1e9;
+        let ticks_late = match clock {
             Clock::Lockstep => 0,
             Clock::Wall => self.periods_ns.iter().filter(|period_ns| **period_ns as f64 > late_ns).count(),
         };
@@ -238,8 +238,9 @@ mod tests {
             stamp_ns += period_ns;
             stamps.observe(stamp_ns);
         }
-        let timing = stamps.timing();
+        let timing = stamps.timing(Clock::Wall, 90.5e-9);
         assert_eq!((timing.tick_p50_s, timing.tick_p99_s), (51e-9, 99e-9));
-        assert_eq!(Stamps::default().timing(), Timing::default());
+        assert_eq!(timing.ticks_late, 1, "one took more than a tenth longer than its period");
+        assert_eq!(Stamps::default().timing(Clock::Lockstep, 0.005), Timing::default());
     }
 }

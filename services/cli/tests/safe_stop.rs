@@ -9,8 +9,8 @@ use mikoshi_ipc_types::{
 use mikoshi_observation::{Observation, TeamTap};
 use mikoshi_resolution::{resolve, tick_schedule};
 use mikoshi_runtime::{
-    ConnectError, InMemoryHub, InMemoryTransport, Loan, OperatorPort, Participant, Publisher, TickError,
-    Topic, Transport, run_in_one_thread,
+    Clock, ConnectError, InMemoryHub, InMemoryTransport, Loan, OperatorPort, Participant, Publisher,
+    TickError, Topic, Transport, run_in_one_thread,
 };
 use mikoshi_servo::ServoParticipant;
 use mikoshi_sim_bridge::BridgeParticipant;

@@ -56,11 +56,13 @@ pub fn replay(
     }
     let mut verdicts: Vec<_> =
         services.iter().map(|&service| Verdict { service, first: None, ticks: 0 }).collect();
-    let mut observation = Observation::for_team(run.robots.len());
+    let mut ahead = Observation::for_team(run.robots.len());
+    let mut is_ahead = log.read_tick(&mut ahead).map_err(Failure::usage)?;
     let mut ticks = 0;
-    while arguments.until.is_none_or(|until| ticks < until)
-        && log.read_tick(&mut observation).map_err(Failure::usage)?
-    {
+    while is_ahead && arguments.until.is_none_or(|until| ticks < until) {
+        let observation = ahead.clone();
+        is_ahead = log.read_tick(&mut ahead).map_err(Failure::usage)?;
+        let next = is_ahead.then_some(&ahead);
         for Revision { service, run, .. } in revisions.iter().filter(|found| found.tick == observation.tick())
         {
             if let Some(index) = services.iter().position(|other| other == service) {
@@ -70,7 +72,7 @@ pub fn replay(
         }
         for (stage, verdict) in stages.iter_mut().zip(&mut verdicts) {
             if !matches!(verdict.first, Some((_, Finding::Fails(_)))) {
-                verdict.take(observation.tick(), stage.execute(&observation));
+                verdict.take(observation.tick(), stage.execute(&observation, next));
             }
         }
         ticks += 1;

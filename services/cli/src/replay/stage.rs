@@ -7,8 +7,8 @@ use mikoshi_ipc_types::{
 };
 use mikoshi_observation::{Observation, Observed};
 use mikoshi_runtime::{
-    Call, ConnectError, InMemoryHub, InMemoryTransport, Observer, Publisher, Replaceable, Tap, TickError,
-    TickSchedule, Topic, Transport,
+    Call, ConnectError, InMemoryHub, InMemoryTransport, Input as ScheduledInput, Observer, Publisher,
+    Replaceable, Tap, TickError, TickSchedule, Topic, Transport,
 };
 use std::collections::VecDeque;
 
@@ -25,8 +25,17 @@ pub struct Stage {
     oldest_use: u64,
 }
 
-/// Hands a recorded frame to the service.
-type Input = Box<dyn FnMut(&Observation) -> Result<(), TickError>>;
+/// A frame that the service waits for.
+struct Input {
+    topic: Topic,
+    age_ticks: u64,
+    /// Hands the recorded one of a tick to the service.
+    tell: Tell,
+}
+
+/// Finds what it tells in what was recorded.
+type Tell = Box<dyn FnMut(&Observation) -> Result<(), TickError>>;
+
 /// Takes what the service says, and compares it with what it said.
 type Output = Box<dyn FnMut(&Observation) -> Result<Option<Difference>, TickError>>;
 
@@ -44,20 +53,16 @@ impl Stage {
         let hub = InMemoryHub::new(schedule.clone());
         let participant = build(&hub.transport(service))?;
         let phases = || schedule.phases_of(service);
-        let inputs = phases().flat_map(|phase| &phase.inputs);
+        let inputs = || phases().flat_map(|phase| &phase.inputs);
         let outputs = phases().flat_map(|phase| &phase.outputs);
         Ok(Self {
             service,
             participant,
             calls: phases().map(|phase| phase.call).collect(),
-            inputs: inputs.map(|input| input_of(&hub, input.topic, input.from)).collect::<Result<_, _>>()?,
+            inputs: inputs().map(|input| input_of(&hub, input)).collect::<Result<_, _>>()?,
             outputs: outputs.map(|output| output_of(&hub, output.topic)).collect::<Result<_, _>>()?,
             recent: VecDeque::new(),
-            oldest_use: phases()
-                .flat_map(|phase| &phase.inputs)
-                .map(|input| input.age_ticks)
-                .max()
-                .unwrap_or(0),
+            oldest_use: inputs().map(|input| input.age_ticks).max().unwrap_or(0),
             hub,
         })
     }
@@ -78,25 +83,34 @@ impl Stage {
         }
         successor.load(&state[..length])?;
         self.participant = successor;
-        // What its predecessor had heard already, and not yet used.
-        for recorded in core::mem::take(&mut self.recent) {
-            self.hear(&recorded)?;
-            self.recent.push_back(recorded);
+        Ok(())
+    }
+
+    /// Tells the service what it heard in time.
+    fn tell(&mut self, recorded: &Observation, next: Option<&Observation>) -> Result<(), TickError> {
+        for Input { topic, age_ticks, tell } in &mut self.inputs {
+            let Some(tick) = recorded.tick().checked_sub(*age_ticks) else { continue };
+            let mut known = self.recent.iter().chain([recorded]);
+            let Some(source) = known.find(|found| found.tick() == tick) else { continue };
+            if came_in_time(*topic, tick, recorded, next) {
+                tell(source)?;
+            }
         }
         Ok(())
     }
 
-    fn hear(&mut self, recorded: &Observation) -> Result<(), TickError> {
-        self.inputs.iter_mut().try_for_each(|input| input(recorded))
-    }
-
-    /// Executes a tick on what was recorded of it; the first difference in what the service says, if any.
+    /// Executes a tick on what was recorded of it; the first difference in what the service says, if any. What
+    /// came in time in wall-clock time the tick's outputs say, and those of the `next`.
     ///
     /// # Errors
     /// It could not execute the tick.
-    pub fn execute(&mut self, recorded: &Observation) -> Result<Option<Difference>, TickError> {
+    pub fn execute(
+        &mut self,
+        recorded: &Observation,
+        next: Option<&Observation>,
+    ) -> Result<Option<Difference>, TickError> {
         self.hub.set_operator_word(recorded.team_state.payload.operator_word);
-        self.hear(recorded)?;
+        self.tell(recorded, next)?;
         if self.oldest_use > 0 {
             self.recent.push_back(recorded.clone());
             if self.recent.len() as u64 > self.oldest_use {
@@ -115,25 +129,47 @@ impl Stage {
     }
 }
 
-fn input_of(hub: &InMemoryHub, topic: Topic, from: ServiceId) -> Result<Input, ConnectError> {
+/// Whether a service heard what was said in `tick` when it needed it: who uses it says what it heard last. Where
+/// that was not recorded, it did.
+fn came_in_time(topic: Topic, tick: u64, recorded: &Observation, next: Option<&Observation>) -> bool {
+    let heard_last = match topic.payload {
+        TeamCommand::NAME => recorded
+            .joint_command
+            .get(topic.robot)
+            .filter(|frame| recorded.is_of_tick(frame))
+            .map(|frame| frame.payload.next_team_command_tick),
+        RobotState::NAME => Some(&recorded.team_state)
+            .filter(|frame| recorded.is_of_tick(frame))
+            .and_then(|frame| frame.payload.next_state_tick.get(topic.robot).copied()),
+        JointCommand::NAME => next.and_then(|next| {
+            let frame = next.sensors.get(topic.robot).filter(|frame| next.is_of_tick(frame));
+            frame.map(|frame| frame.payload.next_joint_command_tick)
+        }),
+        _ => None,
+    };
+    heard_last.is_none_or(|next_tick| next_tick == tick + 1)
+}
+
+fn input_of(hub: &InMemoryHub, input: &ScheduledInput) -> Result<Input, ConnectError> {
     fn feed<P: Observed + ServicePayload>(
         hub: &InMemoryHub,
-        topic: Topic,
-        from: ServiceId,
+        input: &ScheduledInput,
     ) -> Result<Input, ConnectError> {
+        let ScheduledInput { topic, from, age_ticks } = *input;
         let mut port = hub.transport(from).publisher::<P>(topic.robot)?;
-        Ok(Box::new(move |recorded| match P::of(recorded).get(topic.robot) {
-            Some(frame) => port.send(frame.envelope.tick, &frame.payload),
-            None => Err(TickError::InputMissing { topic, tick: recorded.tick() }),
-        }))
+        let tell = move |source: &Observation| match P::of(source).get(topic.robot) {
+            Some(frame) if source.is_of_tick(frame) => port.send(frame.envelope.tick, &frame.payload),
+            _ => Err(TickError::InputMissing { topic, tick: source.tick() }),
+        };
+        Ok(Input { topic, age_ticks, tell: Box::new(tell) })
     }
     // Whatever services may wait for.
-    match topic.payload {
-        Sensors::NAME => feed::<Sensors>(hub, topic, from),
-        RobotState::NAME => feed::<RobotState>(hub, topic, from),
-        TeamCommand::NAME => feed::<TeamCommand>(hub, topic, from),
-        JointCommand::NAME => feed::<JointCommand>(hub, topic, from),
-        _ => Err(ConnectError::NotPublished { topic }),
+    match input.topic.payload {
+        Sensors::NAME => feed::<Sensors>(hub, input),
+        RobotState::NAME => feed::<RobotState>(hub, input),
+        TeamCommand::NAME => feed::<TeamCommand>(hub, input),
+        JointCommand::NAME => feed::<JointCommand>(hub, input),
+        _ => Err(ConnectError::NotPublished { topic: input.topic }),
     }
 }
 
@@ -146,8 +182,11 @@ fn output_of(hub: &InMemoryHub, topic: Topic) -> Result<Output, ConnectError> {
             if !port.try_receive(&mut frame)? {
                 return Err(missing);
             }
-            let recorded = P::of(recorded).get(topic.robot).ok_or(missing)?;
-            Ok(first_difference(&recorded.payload, &frame.payload, topic))
+            let said = P::of(recorded).get(topic.robot).ok_or(missing)?;
+            // What was lost in recording can't be compared.
+            let difference =
+                recorded.is_of_tick(said).then(|| first_difference(&said.payload, &frame.payload, topic));
+            Ok(difference.flatten())
         }))
     }
     match topic.payload {
