@@ -163,7 +163,7 @@ impl Supervisor {
             if !self.look_after(prepared, observer) || self.is_given_up(prepared) {
                 return Watched::Lost;
             }
-            if is_paced(prepared) && self.service_states().all(|(_, state)| state.has_ended()) {
+            if is_paced(prepared) && self.nobody_speaks() {
                 self.team_tap.give_up_waiting();
             }
             let is_set_up = self.all_services_are(State::Ready);
@@ -313,7 +313,13 @@ impl Supervisor {
         }
         self.children.end();
         let outcome = match watched {
-            Watched::All if self.all_have_served() => Outcome::Completed,
+            Watched::All if self.all_have_served() => match self.lost.first() {
+                None => Outcome::Completed,
+                Some(&service) => {
+                    let message = format!("{} was lost, and nobody took its place", label_of(run, service));
+                    Outcome::Fault { failure: Failure::fault(message), faults: vec![] }
+                }
+            },
             Watched::All | Watched::Lost => self.diagnose(run),
             Watched::Signal(signal) => Outcome::Interrupted(signal),
             Watched::Stalled(stall) => stalled(run, &stall, &before),
@@ -350,6 +356,11 @@ impl Supervisor {
         let faults = failed.filter_map(|status| fault_in(run, status)).collect();
         let failure = describe(cause, status_of(cause));
         Outcome::Fault { failure, faults }
+    }
+
+    /// Whether all services have ended, or are lost.
+    fn nobody_speaks(&self) -> bool {
+        self.service_states().all(|(service, state)| state.has_ended() || self.lost.contains(&service))
     }
 
     /// Whether nobody has failed but those that the run went on without.
