@@ -203,6 +203,8 @@ payload! {
         pub holding_hands: u64,
         /// Bits of [`flag`].
         pub flags: u64,
+        /// One past the tick of the last sensor readings that have arrived; 0 before the first.
+        pub next_sensors_tick: u64,
     }
 }
 

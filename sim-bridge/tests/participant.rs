@@ -56,8 +56,13 @@ fn a_bridge_publishes_its_world_and_steps_it_by_all_commands() {
     let commands = constant_commands(&scene.run);
     for tick in 0..5 {
         scene.bridge.execute(Call::Publish, tick).expect("a tick");
+        let heard = |mut sensors: Sensors| {
+            // What the bridge adds to its world's.
+            assert_eq!(core::mem::take(&mut sensors.next_joint_command_tick), tick);
+            sensors
+        };
         let seen = common::Seen {
-            sensors: sensors.iter_mut().map(next).collect(),
+            sensors: sensors.iter_mut().map(next).map(heard).collect(),
             robots: robots.iter_mut().map(next).collect(),
             object: next(&mut object),
         };
@@ -72,25 +77,44 @@ fn a_bridge_publishes_its_world_and_steps_it_by_all_commands() {
 }
 
 #[test]
-fn a_robot_that_stalls_or_sends_another_ticks_frame_ends_the_run_before_physics() {
-    let silent = |_: &mut Scene, _: JointCommand| {};
-    let future = |scene: &mut Scene, command: JointCommand| scene.command(1, 7, command);
-    type Fault<'a> = &'a dyn Fn(&mut Scene, JointCommand);
-    let faults: [(&str, Fault); 2] = [("silent", &silent), ("future", &future)];
-    for (name, fault) in faults {
-        let mut scene = Scene::new();
-        let command = constant_commands(&scene.run)[0];
-        scene.bridge.execute(Call::Publish, 0).expect("a tick");
-        scene.command(0, 0, command);
-        fault(&mut scene, command);
-        let error = scene.bridge.execute(Call::Step, 0).expect_err(name);
-        let is_expected = match name {
-            "silent" => matches!(error, TickError::InputMissing { tick: 0, .. }),
-            _ => matches!(error, TickError::FutureTick { expected: 0, found: 7, .. }),
-        };
-        assert!(is_expected, "{name}: {error}");
-        assert_eq!(scene.bridge.world().tick(), 0);
+fn a_robot_that_sends_another_ticks_frame_ends_the_run_before_physics() {
+    let mut scene = Scene::new();
+    let command = constant_commands(&scene.run)[0];
+    scene.bridge.execute(Call::Publish, 0).expect("a tick");
+    scene.command(0, 0, command);
+    scene.command(1, 7, command);
+    let error = scene.bridge.execute(Call::Step, 0).expect_err("it is of another tick");
+    assert!(matches!(error, TickError::FutureTick { expected: 0, found: 7, .. }), "{error}");
+    assert_eq!(scene.bridge.world().tick(), 0);
+}
+
+#[test]
+fn drives_of_a_robot_that_says_nothing_go_on_and_come_to_rest_and_the_next_readings_say_so() {
+    let mut scene = Scene::new();
+    let commands = constant_commands(&scene.run);
+    let tap = scene.hub.tap();
+    let mut sensors = [0, 1].map(|robot| tap.observer::<Sensors>(robot).expect("an observer"));
+    let mut heard = vec![];
+    for tick in 0..60 {
+        scene.bridge.execute(Call::Publish, tick).expect("a tick");
+        heard.push(sensors.each_mut().map(|port| next(port).next_joint_command_tick));
+        scene.command(0, tick, commands[0]);
+        if tick < 2 || tick == 59 {
+            let mut command = commands[1];
+            command.joint_position_ref_rad[3] += 1e-3 * tick as f64;
+            command.joint_velocity_ref_rad_s[3] = 0.2;
+            scene.command(1, tick, command);
+        }
+        scene.bridge.execute(Call::Step, tick).expect("a tick");
+        if tick == 58 {
+            let coasted = scene.bridge.world().commands()[1];
+            let gone = coasted.joint_position_ref_rad[3] - commands[1].joint_position_ref_rad[3];
+            assert!((0.005..0.012).contains(&gone), "it came {gone} rad far");
+            assert!(coasted.joint_velocity_ref_rad_s[3].abs() < 1e-3);
+        }
     }
+    assert_eq!(heard[..4], [[0, 0], [1, 1], [2, 2], [3, 2]]);
+    assert_eq!(heard[59], [59, 2]);
 }
 
 #[test]

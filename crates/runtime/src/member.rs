@@ -367,7 +367,8 @@ impl Member {
         })
     }
 
-    fn welcome_successors(&self) {
+    /// Connects to those who have taken charge since it last looked, and tells them.
+    pub(crate) fn welcome_successors(&self) {
         let generation = self.board.generation();
         if self.generation.replace(generation) != generation
             && let Some(action) = &*self.on_successor.borrow()

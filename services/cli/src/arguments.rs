@@ -63,9 +63,14 @@ Examples:
   mikoshi soak config/scenarios/transport.toml                 (200 kills)
   mikoshi soak config/scenarios/transport.toml --seed 3 --kills 20 --out /tmp/soak
   mikoshi soak config/scenarios/transport.toml --kills 0       (memory)
+  mikoshi soak config/scenarios/transport.toml --real-time --kills 20 --freezes 20
 
 The run is carried out undisturbed in one thread, and then in processes of which some are killed at ticks drawn
 by seed, alone, in pairs, and twice in a row. Both must leave the same log, byte for byte, and nothing else.
+
+In real time, servos and the coordinator are killed and frozen in turn, each with a standby behind it. The run
+must meet its thresholds, never stop for safety's sake, and leave nothing; told is for how many ticks a command
+was missing.
 
 Exit status:
   0  they do, and the run met its thresholds
@@ -226,9 +231,16 @@ pub struct SoakArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub scenario: ScenarioArguments,
-    /// How often somebody is killed; some strikes hit two, or successors too
-    #[arg(long, value_name = "N", default_value_t = 200)]
-    pub kills: usize,
+    /// Pace ticks by the clock, with standbys: the run must meet its thresholds as if nothing had happened
+    #[arg(long)]
+    pub real_time: bool,
+    /// How often somebody is killed; in lockstep some strikes hit two, or successors too [default: 200, with
+    /// --real-time 100]
+    #[arg(long, value_name = "N")]
+    pub kills: Option<usize>,
+    /// How often somebody is frozen, and thawed when another is in charge [default: 100]
+    #[arg(long, value_name = "N", requires = "real_time")]
+    pub freezes: Option<usize>,
     /// Where the results go [default: runs/soak-NAME-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

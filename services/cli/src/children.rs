@@ -150,6 +150,8 @@ impl Children {
             let cause = match predecessor.look().map(|ended| ended.status) {
                 Some(status) => match status.signal() {
                     Some(signal) => format!("killed by signal {signal}"),
+                    // Who was fenced ends well.
+                    None if status.success() => "fell behind".to_owned(),
                     None => "failed".to_owned(),
                 },
                 None => "fell behind".to_owned(),

@@ -4,13 +4,13 @@
 use mikoshi_config::{RunSpec, load_scenario};
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::{
-    JointCommand, Payload, RobotState, Sensors, ServiceId, ServicePayload, TeamCommand, stop_cause,
+    Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, ServicePayload, TeamCommand, stop_cause,
 };
 use mikoshi_observation::{Observation, TeamTap};
 use mikoshi_resolution::{resolve, tick_schedule};
 use mikoshi_runtime::{
     Clock, ConnectError, InMemoryHub, InMemoryTransport, Loan, OperatorPort, Participant, Publisher,
-    TickError, Topic, Transport, run_in_one_thread,
+    Subscriber, TickError, Topic, Transport, run_in_one_thread,
 };
 use mikoshi_servo::ServoParticipant;
 use mikoshi_sim_bridge::BridgeParticipant;
@@ -24,11 +24,30 @@ use std::rc::Rc;
 /// What a double says in place of what it should: the frame's topic and tick, and its payload.
 type Spoil = Rc<dyn Fn(Topic, u64, &mut [u8])>;
 
+/// Whether nobody hears what is said of a topic in a tick.
+type Silence = Rc<dyn Fn(Topic, u64) -> bool>;
+
 /// The ports of a double.
 #[derive(Clone)]
 struct Spoilt {
     inner: InMemoryTransport,
     spoil: Spoil,
+    silence: Silence,
+}
+
+struct DeafSubscriber<P: ServicePayload> {
+    inner: <InMemoryTransport as Transport>::Subscriber<P>,
+    topic: Topic,
+    silence: Silence,
+}
+
+impl<P: ServicePayload> Subscriber<P> for DeafSubscriber<P> {
+    fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
+        match (self.silence)(self.topic, tick) {
+            true => Err(TickError::InputMissing { topic: self.topic, tick }),
+            false => self.inner.receive(tick, frame),
+        }
+    }
 }
 
 struct SpoiltPublisher<P: Payload> {
@@ -46,7 +65,7 @@ struct SpoiltLoan<'a, P: Payload> {
 
 impl Transport for Spoilt {
     type Publisher<P: Payload> = SpoiltPublisher<P>;
-    type Subscriber<P: ServicePayload> = <InMemoryTransport as Transport>::Subscriber<P>;
+    type Subscriber<P: ServicePayload> = DeafSubscriber<P>;
 
     fn publisher<P: Payload>(&self, robot: usize) -> Result<SpoiltPublisher<P>, ConnectError> {
         let (topic, spoil) = (Topic::of::<P>(robot), Rc::clone(&self.spoil));
@@ -54,7 +73,8 @@ impl Transport for Spoilt {
     }
 
     fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<Self::Subscriber<P>, ConnectError> {
-        self.inner.subscriber(robot)
+        let (topic, silence) = (Topic::of::<P>(robot), Rc::clone(&self.silence));
+        Ok(DeafSubscriber { inner: self.inner.subscriber(robot)?, topic, silence })
     }
 
     fn operator(&self) -> OperatorPort {
@@ -117,6 +137,8 @@ struct Fate {
     /// Its speed in the end.
     speed_end_m_s: f64,
     margin_min_m: f64,
+    tilt_max_rad: f64,
+    hand_force_max_n: f64,
 }
 
 fn fate(spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
@@ -124,11 +146,31 @@ fn fate(spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
 }
 
 fn fate_of(run: &RunSpec, spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fate {
+    fate_with(run, spoil, |_, _| false)
+}
+
+/// Of a team in which some things are not heard.
+fn fate_in_silence(run: &RunSpec, silence: impl Fn(Topic, u64) -> bool + 'static) -> Fate {
+    fate_with(run, |_, _, _| (), silence)
+}
+
+fn fate_with(
+    run: &RunSpec,
+    spoil: impl Fn(Topic, u64, &mut [u8]) + 'static,
+    silence: impl Fn(Topic, u64) -> bool + 'static,
+) -> Fate {
+    let silence: Silence = Rc::new(silence);
     let schedule = tick_schedule(run).expect("a schedule");
     let (hub, spoil): (_, Spoil) = (InMemoryHub::new(schedule.clone()), Rc::new(spoil));
     let services = schedule.services().into_iter();
     let mut participants: Vec<_> = services
-        .map(|id| participant(run, id, &Spoilt { inner: hub.transport(id), spoil: Rc::clone(&spoil) }))
+        .map(|id| {
+            participant(
+                run,
+                id,
+                &Spoilt { inner: hub.transport(id), spoil: Rc::clone(&spoil), silence: Rc::clone(&silence) },
+            )
+        })
         .collect();
     let mut tap = TeamTap::new(&hub.tap(), run.robots.len(), Clock::Lockstep).expect("a tap");
     let mut seen = Observation::for_team(run.robots.len());
@@ -148,6 +190,11 @@ fn fate_of(run: &RunSpec, spoil: impl Fn(Topic, u64, &mut [u8]) + 'static) -> Fa
         for robot in &seen.robot_truth {
             fate.fell |= robot.payload.fallen;
             fate.margin_min_m = fate.margin_min_m.min(robot.payload.zmp_margin_m);
+            fate.tilt_max_rad = fate.tilt_max_rad.max(robot.payload.tilt_rad);
+            for [fx, fy, fz, ..] in robot.payload.hand_wrench {
+                let force_n = (fx * fx + fy * fy + fz * fz).sqrt();
+                fate.hand_force_max_n = fate.hand_force_max_n.max(force_n);
+            }
         }
         ControlFlow::Continue(())
     });
@@ -265,5 +312,55 @@ fn whatever_services_say_nobody_panics_and_the_world_stays_a_world() {
                 }
             }
         });
+    }
+}
+
+/// What a servo says.
+fn is_of_servo(topic: Topic, robot: usize) -> bool {
+    topic == Topic::of::<RobotState>(robot) || topic == Topic::of::<JointCommand>(robot)
+}
+
+#[test]
+fn a_servo_that_is_lost_stops_the_team_in_whatever_phase_of_a_step_and_nobody_falls() {
+    for eighth in 0..8 {
+        let from = WALKING + eighth * STEP / 8;
+        for robot in [1, 2] {
+            let fate =
+                fate_in_silence(&walk("[]"), move |topic, tick| tick >= from && is_of_servo(topic, robot));
+            println!("{eighth} {robot} {fate:?}");
+            //expect_safe_stop(&fate, from, stop_cause::STALE, robot);
+        }
+    }
+}
+
+/// Ticks of a step.
+const STEP: u64 = 160;
+
+#[test]
+fn for_a_moment_a_servo_or_the_coordinator_may_be_silent() {
+    // As long as it takes until a standby has noticed.
+    const GAP: u64 = 4;
+    let silent = |tick: u64| tick >= STANDING && (tick / 80).is_multiple_of(2) && tick % 80 < GAP;
+    let run = walk("[]");
+    let of_servos = fate_in_silence(&run, move |topic, tick| {
+        silent(tick) && is_of_servo(topic, (tick / 160) as usize % 4)
+    });
+    let of_coordinator =
+        fate_in_silence(&run, move |topic, tick| silent(tick) && topic.payload == TeamCommand::NAME);
+    for fate in [of_servos, of_coordinator] {
+        println!("{fate:?}");
+        assert_eq!((fate.stop, fate.fell), (None, 0), "{fate:?}");
+        assert!(fate.margin_min_m > 0.025, "{fate:?}");
+    }
+}
+
+#[test]
+fn without_their_coordinator_robots_finish_their_step_and_stand() {
+    for from in [WALKING, WALKING + STEP / 2] {
+        let fate = fate_in_silence(&walk("[]"), move |topic, tick| {
+            tick >= from && topic.payload == TeamCommand::NAME
+        });
+        assert_eq!(fate.fell, 0, "{fate:?}");
+        assert!(fate.speed_end_m_s < 0.005 && fate.sunk_m < 0.02, "{fate:?}");
     }
 }

@@ -76,7 +76,7 @@ impl SafetyState {
 
     /// Whether it is because what is measured can't be believed: then nothing may be controlled by it.
     pub(crate) fn is_blind(&self) -> bool {
-        self.cause == stop_cause::INPUT
+        matches!(self.cause, stop_cause::INPUT | stop_cause::STALE)
     }
 }
 

@@ -85,6 +85,8 @@ impl<T: Transport> ServoParticipant<T> {
         let mut flags = core::mem::take(&mut self.heard.flags);
         let received = self.sensor_port.receive(tick, &mut self.sensors);
         let sensors = &self.sensors.payload;
+        let has_arrived = matches!(received, Ok(()) | Err(TickError::NotFinite { .. }));
+        let next_sensors_tick = if has_arrived { tick + 1 } else { self.robot_state.next_sensors_tick };
         match received {
             Ok(()) if self.servo.believes(sensors) => {
                 flags |= if sensors.command_rejected != 0 { flag::INPUT_REJECTED } else { 0 };
@@ -96,8 +98,13 @@ impl<T: Transport> ServoParticipant<T> {
                 self.servo.sense_nothing(&mut self.state, &mut self.robot_state);
             }
             Ok(()) => return Err(TickError::Service("the sensors say what can't be")),
+            Err(TickError::InputMissing { .. }) if tick > 0 => {
+                flags |= flag::INPUT_MISSING;
+                self.servo.sense_nothing(&mut self.state, &mut self.robot_state);
+            }
             Err(error) => return Err(error),
         }
+        self.robot_state.next_sensors_tick = next_sensors_tick;
         self.robot_state.flags |= flags;
         Ok(())
     }

@@ -576,6 +576,8 @@ pub struct IceoryxObserver<P: Payload> {
 impl<P: Payload> Observer<P> for IceoryxObserver<P> {
     fn try_receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
         let topic = self.topic;
+        // Who only looks now and then has no wait in which to do so.
+        self.process.member.welcome_successors();
         let Some(sample) = self.port.receive().map_err(|_| TickError::TransportFailed { topic })? else {
             return Ok(false);
         };

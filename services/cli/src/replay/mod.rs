@@ -78,9 +78,15 @@ pub fn replay(
         ticks += 1;
     }
     let is_same = verdicts.iter().all(|verdict| verdict.first.is_none());
-    let told = tell(&run, &schedule, &verdicts, ticks, log.damage().map(ToString::to_string));
+    let damage = match log.damage() {
+        Some(damage) => Some((ticks, damage.to_string())),
+        // Something may have changed that no service hears or says.
+        None if is_same && arguments.until.is_none() => checked_damage(arguments)?,
+        None => None,
+    };
+    let is_whole = damage.is_none();
+    let told = tell(&run, &schedule, &verdicts, ticks, damage);
     print_out(&told);
-    let is_whole = log.damage().is_none();
     Ok(if is_same && is_whole { Status::Met } else { Status::NotMet })
 }
 
@@ -106,6 +112,16 @@ impl Verdict {
     }
 }
 
+/// Up to which tick the log's own checksums hold, and why no further.
+fn checked_damage(arguments: &ReplayArguments) -> Result<Option<(u64, String)>, Failure> {
+    let mut log = LogReader::open(&arguments.log).map_err(Failure::usage)?;
+    let mut ticks = 0;
+    while let Some(payload) = log.next_payload().map_err(Failure::usage)? {
+        ticks = payload.tick + 1;
+    }
+    Ok(log.damage().map(|damage| (ticks, damage.to_string())))
+}
+
 fn chosen(run: &RunSpec, services: Vec<ServiceId>, names: &[String]) -> Result<Vec<ServiceId>, Failure> {
     if names.is_empty() {
         return Ok(services);
@@ -120,7 +136,7 @@ fn tell(
     schedule: &TickSchedule,
     verdicts: &[Verdict],
     ticks: u64,
-    damage: Option<String>,
+    damage: Option<(u64, String)>,
 ) -> String {
     let mut text = String::new();
     for Verdict { service, first, ticks: differing } in verdicts {
@@ -146,8 +162,9 @@ fn tell(
     {
         let _ = writeln!(text, "the first of all: {}", label_of(run, cause.service));
     }
-    if let Some(damage) = damage {
-        let _ = writeln!(text, "the log is cut or damaged after {ticks} of {} ticks: {damage}", run.ticks);
+    if let Some((whole_ticks, damage)) = damage {
+        let whole = run.ticks;
+        let _ = writeln!(text, "the log is cut or damaged after {whole_ticks} of {whole} ticks: {damage}");
     } else if ticks < run.ticks {
         let _ = writeln!(text, "the log holds {ticks} of {} ticks", run.ticks);
     }

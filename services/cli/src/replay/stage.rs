@@ -133,6 +133,11 @@ impl Stage {
 /// that was not recorded, it did.
 fn came_in_time(topic: Topic, tick: u64, recorded: &Observation, next: Option<&Observation>) -> bool {
     let heard_last = match topic.payload {
+        Sensors::NAME => recorded
+            .robot_state
+            .get(topic.robot)
+            .filter(|frame| recorded.is_of_tick(frame))
+            .map(|frame| frame.payload.next_sensors_tick),
         TeamCommand::NAME => recorded
             .joint_command
             .get(topic.robot)

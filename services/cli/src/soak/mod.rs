@@ -1,5 +1,6 @@
 //! A run whose processes are killed, and the same run undisturbed.
 
+mod by_the_clock;
 mod memory;
 mod victims;
 
@@ -32,6 +33,8 @@ use victims::Strike;
 /// How often it is looked where a run is: well within a tick.
 const LOOK: Duration = Duration::from_micros(200);
 const MEMORY_PERIOD: Duration = Duration::from_secs(1);
+/// How often somebody is killed, unless told otherwise.
+const KILLS: usize = 200;
 
 /// What a soak came to.
 #[derive(Debug, Serialize)]
@@ -75,6 +78,9 @@ struct MemoryRow {
 pub fn soak(arguments: &SoakArguments) -> Result<Status, Failure> {
     let interrupts = Interrupts::listen().map_err(Failure::fault)?;
     let run = prepare(&arguments.scenario)?.run;
+    if arguments.real_time {
+        return by_the_clock::soak(arguments, &run, &interrupts);
+    }
     let default = || Path::new("runs").join(format!("soak-{}-{}", run.scenario.name, run.scenario.seed));
     let out = arguments.out.clone().unwrap_or_else(default);
     let (calm, rough) = (out.join("undisturbed"), out.join("disturbed"));
@@ -83,10 +89,11 @@ pub fn soak(arguments: &SoakArguments) -> Result<Status, Failure> {
         // Nobody else writes there meanwhile.
         drop(OutputDirectory::open(folder, true)?);
     }
-    let undisturbed = Attempt::start(arguments, &calm, true)?.finish(&interrupts)?;
+    let undisturbed = Attempt::start(arguments, &calm, &["--in-process"])?.finish(&interrupts)?;
 
-    let strikes = victims::draw(run.scenario.seed, arguments.kills, run.ticks, run.robots.len());
-    let mut attempt = Attempt::start(arguments, &rough, false)?;
+    let kills = arguments.kills.unwrap_or(KILLS);
+    let strikes = victims::draw(run.scenario.seed, kills, run.ticks, run.robots.len());
+    let mut attempt = Attempt::start(arguments, &rough, &[])?;
     let mut watch = Watch {
         run: &run,
         directory: attempt.directory(),
@@ -115,7 +122,7 @@ struct Attempt {
 }
 
 impl Attempt {
-    fn start(arguments: &SoakArguments, out: &Path, in_process: bool) -> Result<Self, Failure> {
+    fn start(arguments: &SoakArguments, out: &Path, options: &[&str]) -> Result<Self, Failure> {
         let program = binaries::find("mikoshi")?;
         let mut command = Command::new(&program);
         command
@@ -126,11 +133,9 @@ impl Attempt {
         if let Some(seed) = arguments.scenario.seed {
             command.args(["--seed", &seed.to_string()]);
         }
+        command.args(options);
         for (key, value) in &arguments.scenario.overrides {
             command.arg("--set").arg(format!("{key}={value}"));
-        }
-        if in_process {
-            command.arg("--in-process");
         }
         let child = children::start(command, &out.with_extension("log"))
             .map_err(|error| Failure::fault(error).context(program.display()))?;
