@@ -137,6 +137,7 @@ impl LogReader {
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(is_checked)
             .with_validate_chunk_crcs(is_checked)
+            .with_validate_data_section_crc(is_checked)
             .with_record_length_limit(MAX_RECORD_BYTES);
         let mut records = LinearReader::new_with_options(options);
         let foreign = |found: &str| ReadLogError::RejectFile { path: path.clone(), found: found.to_owned() };

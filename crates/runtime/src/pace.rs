@@ -6,6 +6,9 @@ use rustix::time::{ClockId, Timespec, clock_gettime};
 
 const NS_PER_S: u64 = 1_000_000_000;
 
+/// How much longer inputs of the first ticks are waited for.
+const START_PATIENCE_NS: u64 = NS_PER_S;
+
 /// Nanoseconds on the machine's monotonic clock.
 pub(crate) fn now_ns() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
@@ -25,8 +28,8 @@ pub(crate) struct Pace {
     pub period_ns: u64,
     /// By phase, from the beginning of its tick; none where it waits for the tick itself.
     due_ns: Vec<Option<u64>>,
-    /// In the first ticks nobody is late.
-    first_due_tick: u64,
+    /// In the ticks before, processes are still getting ready.
+    first_usual_tick: u64,
 }
 
 impl Pace {
@@ -42,14 +45,15 @@ impl Pace {
         Some(Self {
             period_ns,
             due_ns: schedule.phases_of(service).map(due_ns).collect(),
-            first_due_tick: ages.max().unwrap_or(0) + 1,
+            first_usual_tick: ages.max().unwrap_or(0) + 1,
         })
     }
 
     /// When the inputs of this phase are due in a run whose tick 0 began at `origin_ns`.
     pub fn due_ns(&self, origin_ns: u64, at: Position) -> Option<u64> {
         let due_ns = self.due_ns.get(at.phase).copied().flatten()?;
-        (at.tick >= self.first_due_tick).then(|| self.start_ns(origin_ns, at.tick).saturating_add(due_ns))
+        let patience_ns = if at.tick < self.first_usual_tick { START_PATIENCE_NS } else { 0 };
+        Some(self.start_ns(origin_ns, at.tick).saturating_add(due_ns + patience_ns))
     }
 
     /// When this tick begins.
@@ -91,10 +95,11 @@ mod tests {
     }
 
     #[test]
-    fn in_the_first_ticks_nobody_is_late() {
+    fn inputs_of_the_first_ticks_may_take_a_second_more() {
         let bridge = pace_of(ServiceId::Bridge);
         let due = |tick| bridge.due_ns(0, Position { tick, phase: 1 });
-        assert_eq!([due(0), due(1)], [None, None]);
-        assert!(due(2).is_some());
+        let usual = |tick| tick * PERIOD_NS + PERIOD_NS / 2;
+        let expected = [usual(0) + START_PATIENCE_NS, usual(1) + START_PATIENCE_NS, usual(2)];
+        assert_eq!([due(0), due(1), due(2)], expected.map(Some));
     }
 }

@@ -327,8 +327,12 @@ fn a_servo_that_is_lost_stops_the_team_in_whatever_phase_of_a_step_and_nobody_fa
         for robot in [1, 2] {
             let fate =
                 fate_in_silence(&walk("[]"), move |topic, tick| tick >= from && is_of_servo(topic, robot));
-            println!("{eighth} {robot} {fate:?}");
-            //expect_safe_stop(&fate, from, stop_cause::STALE, robot);
+            let (tick, cause, of) = fate.stop.expect("the team has stopped");
+            assert!((from..from + 20).contains(&tick), "{fate:?}");
+            assert_eq!((cause, of), (stop_cause::STALE, robot as u64 + 1), "{fate:?}");
+            // Its drives hold, perhaps on one foot: it leans on the object, and the others bear that.
+            assert!(fate.fell == 0 && fate.sunk_m < 0.02, "{fate:?}");
+            assert!(fate.tilt_max_rad < 0.1 && fate.hand_force_max_n < 150.0, "{fate:?}");
         }
     }
 }
@@ -348,7 +352,6 @@ fn for_a_moment_a_servo_or_the_coordinator_may_be_silent() {
     let of_coordinator =
         fate_in_silence(&run, move |topic, tick| silent(tick) && topic.payload == TeamCommand::NAME);
     for fate in [of_servos, of_coordinator] {
-        println!("{fate:?}");
         assert_eq!((fate.stop, fate.fell), (None, 0), "{fate:?}");
         assert!(fate.margin_min_m > 0.025, "{fate:?}");
     }

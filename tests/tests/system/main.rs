@@ -7,6 +7,7 @@ mod environment;
 mod faults;
 mod job;
 mod leader_follower;
+mod real_time;
 mod replay;
 mod report;
 mod succession;
