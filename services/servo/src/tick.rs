@@ -37,7 +37,7 @@ pub struct Servo {
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 4;
+pub(crate) const STATE_VERSION: u64 = 5;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
