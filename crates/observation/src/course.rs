@@ -126,3 +126,76 @@ fn misplaced(
     let yaw = mikoshi_spatial::log(&error.rotation).z;
     Some((error.transform_point(at).xy(), yaw))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mikoshi_ipc_types::RobotState;
+    use mikoshi_spatial::{Object, Twist, Wrench};
+
+    /// Two minutes and a half of ticks of 1 s. The object is 1 mm off in the first minute and 3 mm from then on; an
+    /// internal force grows by 1 N a tick; the second robot's odometry drifts by 1 mm a tick, which the team knows.
+    fn course() -> Vec<MinuteSummary> {
+        let mut course = Course::new(1.0);
+        for tick in 0..150 {
+            let mut observation = Observation::for_team(2);
+            observation.object_truth.envelope.tick = tick;
+            let team_state = &mut observation.team_state.payload;
+            team_state.team_mode = mode::CARRY;
+            team_state.odometry_pose.fill(Pose::<World, Odometry>::identity().to_array());
+            let drift_m = 1e-3 * tick as f64;
+            team_state.odometry_pose[1][0] = -drift_m;
+            for (robot, (truth, state)) in
+                observation.robot_truth.iter_mut().zip(&mut observation.robot_state).enumerate()
+            {
+                let X_WB = [0.5, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0];
+                truth.payload.base_pose = X_WB;
+                truth.payload.zmp_margin_m = 0.05 - 1e-4 * tick as f64;
+                state.payload = RobotState { base_pose: X_WB, ..state.payload };
+                state.payload.base_pose[0] += drift_m * robot as f64;
+            }
+            let off_m = if tick < 60 { 0.001 } else { 0.003 };
+            let X_WA = Pose::<World, Object>::identity();
+            let object = TrackedObject {
+                X_WBody: X_WA,
+                X_WA,
+                X_WA_ref: Some(X_WA.displaced(&Twist::new(Vector3::new(0.0, off_m, 0.0), Vector3::zeros()))),
+                internal: vec![Wrench::new(Vector3::new(tick as f64, 0.0, 0.0), Vector3::zeros())],
+            };
+            course.observe(&object, &observation);
+        }
+        course.finish()
+    }
+
+    #[test]
+    fn every_minute_is_told_of_itself() {
+        let course = course();
+        assert_eq!(course.iter().map(|minute| minute.start_s).collect::<Vec<_>>(), [0.0, 60.0, 120.0]);
+        let about = |value: f64, expected: f64| (value - expected).abs() < 1e-12;
+        for (minute, object_m) in course.iter().zip([0.001, 0.003, 0.003]) {
+            assert!(about(minute.object_rms_m, object_m) && about(minute.object_peak_m, object_m));
+        }
+        for (minute, last) in course.iter().zip([59.0, 119.0, 149.0]) {
+            assert_eq!(minute.internal_peak_n, last);
+            assert!(about(minute.zmp_margin_min_m, 0.05 - 1e-4 * last));
+            assert!(about(minute.odometry_apart_m, 1e-3 * last) && about(minute.frames_apart_m, 0.0));
+        }
+        // A law is judged from 3 s after its start on.
+        assert!(about(course[0].internal_mean_n, 31.0) && about(course[1].internal_mean_n, 89.5));
+    }
+
+    #[test]
+    fn worlds_that_are_turned_are_told_apart_where_the_object_is() {
+        let mut observation = Observation::for_team(2);
+        for (truth, state) in observation.robot_truth.iter_mut().zip(&mut observation.robot_state) {
+            truth.payload.base_pose = [2.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0];
+            state.payload.base_pose = truth.payload.base_pose;
+        }
+        let turned = Pose::<World, Odometry>::identity()
+            .displaced(&Twist::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.01)));
+        let frames = [Pose::<World, Odometry>::identity().to_array(), turned.to_array()];
+        let (distance, angle) = apart(&observation, &frames, &Vector3::new(0.0, 3.0, 1.0));
+        assert!((distance - 3.0 * 2.0 * 0.005_f64.sin()).abs() < 1e-12, "{distance}");
+        assert!((angle - 0.01).abs() < 1e-12);
+    }
+}

@@ -20,8 +20,9 @@ use mikoshi_ipc_types::{MAX_HANDS_OF_TEAM, MAX_ROBOTS};
 use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// A robot parts by up to 17 mm per metre walked; at 0.1 m/s this leaves it 7 mm off. Its sway of some
-/// millimetres comes and goes with every second step of 0.8 s, and is averaged.
+/// Robots that walk with .04 m/s part by .25 mm/s, and by four times that where feet are believed to stand where
+/// they were sent: this leaves them 1 mm off, or 4. Their sway of some millimetres comes and goes with every second
+/// step of .8 s, and is averaged.
 const TIME_CONSTANT_S: f64 = 4.0;
 /// Several times what a robot that walks fast drifts.
 const LIMIT_M_S: f64 = 0.01;
