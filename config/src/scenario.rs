@@ -55,6 +55,9 @@ pub struct Scenario {
     /// How robots keep their balance.
     #[serde(default)]
     pub balance: Balance,
+    /// How robots know where they are.
+    #[serde(default)]
+    pub odometry: Odometry,
     /// What stands around the team.
     #[serde(default)]
     pub world: World,
@@ -225,6 +228,21 @@ pub struct Balance {
 impl Default for Balance {
     fn default() -> Self {
         Self { stabiliser: true }
+    }
+}
+
+/// How robots know where they are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Odometry {
+    /// Whether the object that all hold keeps their worlds together; without, each walks in a world of its
+    /// own.
+    pub landmark: bool,
+}
+
+impl Default for Odometry {
+    fn default() -> Self {
+        Self { landmark: true }
     }
 }
 

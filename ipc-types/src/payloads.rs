@@ -272,6 +272,8 @@ payload! {
         pub stop_robot: u64,
         /// For each robot, one past the tick of its last state that has arrived; 0 before the first.
         pub next_state_tick: [u64; MAX_ROBOTS],
+        /// Where each robot's own world lies in the team's, by the object that all hold.
+        pub odometry_pose: [PoseWire; MAX_ROBOTS],
     }
 }
 

@@ -88,6 +88,7 @@ mod gain_bound;
 mod generalized;
 mod hybrid;
 mod internal_forces;
+mod landmark;
 mod linear;
 mod selection;
 mod team_arms;
@@ -105,6 +106,7 @@ pub use internal_forces::{
     BuildInternalForcesError, InternalForces, OBJECT_ROW, RowCombination, change_of_representation,
     pair_matrix, pairwise_forces,
 };
+pub use landmark::{BuildLandmarkError, FrameCorrection, Landmark, LandmarkParameters, Sighting};
 pub use linear::Linear;
 pub use selection::{Axis, Control, Selection};
 pub use team_arms::{BuildTeamArmsError, RobotArms, TeamArms};

@@ -37,6 +37,7 @@ fn gait_with_preview(bencher: Bencher) {
         clock: robot.state.clock,
         hand_centre: Some(robot.centre),
         foot_force: PerFoot { right: 550.0, left: 0.0 },
+        soles: None,
         load: ExternalLoad::NONE,
     };
     bencher.bench_local(|| {

@@ -290,6 +290,26 @@ fn without_a_grasp_feet_march_in_place() {
     }
 }
 
+/// Legs that sag set each foot down where it was not sent. Where it is felt, the next steps begin, and no
+/// sooner than it has landed.
+#[test]
+fn a_foot_stands_where_it_was_felt_to_land() {
+    let mut robot = Robot::standing_at(GroundPose::default(), on_rigid_ground());
+    robot.state.placement = None;
+    let (start, off) = (robot.state.feet, Vector2::new(-0.0004, 0.0001));
+    let timing = robot.gait.config().timing;
+    let first_landing = timing.step(0);
+    let mut clock =
+        StepClock::Stepping { step_index: 0, tick_in_step: 0, swing: Side::Left, will_continue: true };
+    for _ in 0..first_landing + timing.step(1) / 2 {
+        robot.act_where(clock, ExternalLoad::NONE, Some(off));
+        clock = clock.extrapolated(&timing, 1);
+    }
+    let moved = |side: Side| robot.state.feet[side].pose.position - start[side].pose.position;
+    assert!((moved(Side::Left) - off).norm() < 1e-12, "{}", moved(Side::Left));
+    assert_eq!(moved(Side::Right), Vector2::zeros(), "it has not left the ground, or not come down yet");
+}
+
 #[test]
 fn a_load_in_the_hands_moves_the_centre_of_mass_and_not_the_zmp() {
     let mut robot = Robot::standing_at(GroundPose::default(), on_rigid_ground());
@@ -301,6 +321,7 @@ fn a_load_in_the_hands_moves_the_centre_of_mass_and_not_the_zmp() {
             clock: StepClock::Standing,
             hand_centre: Some(robot.centre),
             foot_force: PerFoot { right: 300.0, left: 300.0 },
+            soles: None,
             load,
         };
         robot.gait.act(&mut robot.state, &inputs);
@@ -322,6 +343,7 @@ fn a_tick_allocates_nothing_and_a_copy_of_the_state_goes_on_alike() {
             clock: team.clock.clock,
             hand_centre: Some(robot.centre),
             foot_force: PerFoot { right: 275.0, left: 275.0 },
+            soles: None,
             load: ExternalLoad::NONE,
         };
         let mut twin = copy;

@@ -1,8 +1,9 @@
 //! The figures of a run, gathered tick by tick from ground truth.
 
 use crate::canonical::Observation;
+use crate::course::Course;
 use crate::internal::{InternalFigures, raise};
-use crate::summary::{InternalSummary, ModeSummary, ObjectSummary, RobotSummary};
+use crate::summary::{InternalSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary};
 use crate::truth::{FootTracker, ObjectTracker, TrackedObject};
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, ObjectTruth, RobotState, RobotTruth, mode};
 use mikoshi_spatial::{Object, Pose, World};
@@ -62,6 +63,7 @@ pub struct Figures {
     tracker: ObjectTracker,
     modes: Vec<(u64, u64)>,
     object: ObjectFigures,
+    course: Course,
     robots: Vec<RobotFigures>,
     unintended_contact_ticks: u64,
 }
@@ -79,6 +81,7 @@ pub struct JudgedFigures {
     pub unintended_contact_ticks: u64,
     pub drift_between_robots_m: f64,
     pub modes: Vec<ModeSummary>,
+    pub minutes: Vec<MinuteSummary>,
 }
 
 impl Figures {
@@ -91,6 +94,7 @@ impl Figures {
         Self {
             tracker: ObjectTracker::new(&run),
             internal: InternalFigures::new(&run),
+            course: Course::new(run.control_period_s),
             run,
             modes: vec![],
             object: ObjectFigures::default(),
@@ -105,6 +109,7 @@ impl Figures {
             return;
         };
         self.object.observe(&object);
+        self.course.observe(&object, observation);
         if self.is_end(observation.tick()) {
             self.object.observe_end(&observation.object_truth.payload);
         }
@@ -148,6 +153,7 @@ impl Figures {
             fell: robots.clone().filter(|(_, f)| f.has_fallen).map(|(robot, _)| robot.name.clone()).collect(),
             robots: robots.map(|(robot, figures)| figures.finish(robot, period_s)).collect(),
             drift_between_robots_m,
+            minutes: self.course.finish(),
             modes: self
                 .modes
                 .iter()

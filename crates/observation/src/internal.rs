@@ -7,7 +7,7 @@ use mikoshi_spatial::{Object, Wrench};
 use std::collections::VecDeque;
 
 /// How long after its start the hybrid law is judged.
-const JUDGED_AFTER_S: f64 = 3.0;
+pub(crate) const JUDGED_AFTER_S: f64 = 3.0;
 /// Length of the window in which measured and true internal forces are compared.
 const COMPARED_S: f64 = 1.0;
 

@@ -5,6 +5,7 @@
 #![allow(non_snake_case)]
 
 mod canonical;
+mod course;
 mod figures;
 mod freshness;
 mod internal;
@@ -19,6 +20,8 @@ pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, Observed
 pub use freshness::Freshness;
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
-pub use summary::{Fault, InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing};
+pub use summary::{
+    Fault, InternalSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing,
+};
 pub use tap::TeamTap;
 pub use truth::{FootTracker, ObjectTracker, TrackedObject, is_loaded};

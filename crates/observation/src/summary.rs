@@ -32,6 +32,9 @@ pub struct Summary {
     pub robots: Vec<RobotSummary>,
     /// How far the robots' own estimates have moved against each other, horizontally.
     pub drift_between_robots_m: f64,
+    /// The run minute by minute.
+    #[serde(default)]
+    pub minutes: Vec<MinuteSummary>,
     /// Ticks in which something touched that nobody meant to.
     pub unintended_contact_ticks: u64,
     pub timing: Timing,
@@ -45,6 +48,25 @@ pub struct Summary {
 pub struct ModeSummary {
     pub mode: String,
     pub start_s: f64,
+}
+
+/// A minute of a run, or what there is of its last: largest errors and forces of any axis, row and robot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct MinuteSummary {
+    pub start_s: f64,
+    pub object_rms_m: f64,
+    pub object_peak_m: f64,
+    /// Mean norm of the row that has most.
+    pub internal_mean_n: f64,
+    pub internal_peak_n: f64,
+    pub zmp_margin_min_m: f64,
+    /// How far apart the object would be by two robots' own odometries, at the end of the minute.
+    pub odometry_apart_m: f64,
+    pub odometry_apart_rad: f64,
+    /// The same as the team sees it, which knows where each odometry has the world.
+    pub frames_apart_m: f64,
+    pub frames_apart_rad: f64,
 }
 
 /// How well Σa, as it was fixed to the object when the hybrid law started, kept to its reference from then

@@ -5,7 +5,7 @@ use crate::html::{escaped, figure, page, table};
 use crate::scene::Figure;
 use crate::write::{JudgedLimit, ReportedRun};
 use core::fmt::Write as _;
-use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
+use mikoshi_observation::{InternalSummary, MinuteSummary, ObjectSummary, RobotSummary, Summary};
 
 /// The page. Every figure comes with its number and its SVG.
 pub fn html(runs: &[ReportedRun], figures: &[(u32, Figure, String)], left_out: &[LeftOut]) -> String {
@@ -53,6 +53,7 @@ fn section(run: &ReportedRun, is_one_of_two: bool) -> String {
         ("Internal forces", internal_table(&summary.internal)),
         ("Object against its reference", object_table(&summary.object)),
         ("Robots", robots_table(summary)),
+        ("Minute by minute", minutes_table(&summary.minutes)),
         ("Thresholds", limits_table(&run.limits)),
     ] {
         let _ = write!(html, "<div>\n<h3>{title}</h3>\n{content}</div>\n");
@@ -160,6 +161,37 @@ fn object_table(object: &ObjectSummary) -> String {
         "<p>It travelled by ({x}, {y}, {z}) m and turned by ({roll}, {pitch}, {yaw}) rad.</p>"
     );
     html
+}
+
+fn minutes_table(minutes: &[MinuteSummary]) -> String {
+    let titles = [
+        "from s",
+        "object RMS mm",
+        "peak",
+        "internal mean N",
+        "peak",
+        "ZMP margin mm",
+        "odometries apart mm",
+        "mrad",
+        "as the team sees it mm",
+        "mrad",
+    ];
+    let milli = |value: f64| format!("{:.2}", 1e3 * value);
+    let cells = |minute: &MinuteSummary| {
+        vec![
+            format!("{:.0}", minute.start_s),
+            milli(minute.object_rms_m),
+            milli(minute.object_peak_m),
+            format!("{:.2}", minute.internal_mean_n),
+            format!("{:.2}", minute.internal_peak_n),
+            milli(minute.zmp_margin_min_m),
+            milli(minute.odometry_apart_m),
+            milli(minute.odometry_apart_rad),
+            milli(minute.frames_apart_m),
+            milli(minute.frames_apart_rad),
+        ]
+    };
+    table(&titles, minutes.iter().map(cells))
 }
 
 fn robots_table(summary: &Summary) -> String {

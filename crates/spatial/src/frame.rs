@@ -17,6 +17,8 @@ macro_rules! frames {
 frames! {
     /// Σo: the common frame of the team, z up.
     World,
+    /// Where one robot's own odometry has Σo.
+    Odometry,
     /// Σa: fixed to the carried object, origin at its reference point.
     Object,
     /// Σh: fixed to a grasping hand.

@@ -44,7 +44,7 @@ mod rotation;
 mod vector;
 
 pub use euler::{euler_rate_matrix, euler_zyx};
-pub use frame::{Base, CoordinateFrame, Foot, Hand, Object, Sensor, Tip, World};
+pub use frame::{Base, CoordinateFrame, Foot, Hand, Object, Odometry, Sensor, Tip, World};
 pub use pose::Pose;
 pub use rotation::{exp, log, skew};
 pub use vector::{Twist, Wrench};

@@ -141,6 +141,7 @@ impl RunObserver {
             internal_measurement_error_nm: figures.internal_measurement_error_nm,
             robots: figures.robots,
             drift_between_robots_m: figures.drift_between_robots_m,
+            minutes: figures.minutes,
             unintended_contact_ticks: figures.unintended_contact_ticks,
             timing: Timing {
                 ticks_held: self.freshness.ticks_held(),

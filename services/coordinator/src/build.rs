@@ -4,8 +4,9 @@ use mikoshi_config::scenario::{Axis, Control, InternalForces as Representation, 
 use mikoshi_config::{RobotSpec, RunSpec};
 use mikoshi_cooperation as cooperation;
 use mikoshi_cooperation::{
-    BuildHybridLawError, BuildInternalForcesError, BuildTeamArmsError, ForceGains, HandStiffness, HybridLaw,
-    HybridParameters, InternalForces, RobotArms, Selection, StartHybridError, TeamArms, VirtualStick,
+    BuildHybridLawError, BuildInternalForcesError, BuildLandmarkError, BuildTeamArmsError, ForceGains,
+    HandStiffness, HybridLaw, HybridParameters, InternalForces, RobotArms, Selection, StartHybridError,
+    TeamArms, VirtualStick,
 };
 use mikoshi_spatial::{Hand, Object, Pose};
 
@@ -27,6 +28,8 @@ pub enum BuildCoordinatorError {
     InternalForces(#[from] BuildInternalForcesError),
     #[error("hybrid: {0}")]
     Law(#[from] BuildHybridLawError),
+    #[error("robots' odometry: {0}")]
+    Landmark(#[from] BuildLandmarkError),
     #[error("grasp: {0}")]
     Grasp(#[from] StartHybridError),
     #[error("hybrid.axes: there is no row `{found}`; expected one of {expected}")]

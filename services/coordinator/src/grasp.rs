@@ -61,7 +61,7 @@ impl GraspCompliance {
     }
 
     /// How far the point of the object is displaced where the tip of a hand's stick is.
-    fn tip_yield(
+    pub(crate) fn tip_yield(
         &self,
         X_WH: &Pose<World, Hand>,
         stick: &VirtualStick,

@@ -12,6 +12,7 @@ mod grasp;
 mod job;
 mod leading;
 mod object_motion;
+mod odometry;
 mod participant;
 mod reference;
 mod safety;

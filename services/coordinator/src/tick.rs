@@ -5,6 +5,7 @@ use crate::grasp::GraspCompliance;
 use crate::job::{Job, Phase, PhaseWords, Seen};
 use crate::leading::{Leading, LeadingState};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
+use crate::odometry::{self, OdometryFrames, OdometryState};
 use crate::reference::References;
 use crate::safety::{Safety, SafetyState, SeenTeam};
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
@@ -18,7 +19,7 @@ use mikoshi_humanoid::gait::StepTiming;
 use mikoshi_ipc_types::{
     MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, all_hands, mode,
 };
-use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench};
+use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// How near its place on the object a hand must be, by its robot's word, to be closed.
@@ -34,6 +35,7 @@ pub struct Coordinator {
     resting_law: HybridLaw,
     references: References,
     compliance: GraspCompliance,
+    odometry: OdometryFrames,
     /// Whether the team presses the object against something: an axis of it is under force control.
     presses: bool,
     /// One robot leads; absent where the team is coordinated by symmetry.
@@ -52,7 +54,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 3;
+pub(crate) const STATE_VERSION: u64 = 4;
 
 /// All that matters between ticks.
 #[repr(C)]
@@ -62,6 +64,8 @@ pub struct CoordinatorState {
     /// The object's reference, from where the virtual sticks saw it when the hybrid law started.
     motion: ObjectMotionState,
     clock: TeamClockState,
+    /// Where each robot has the world.
+    odometry: OdometryState,
     /// Where one robot leads.
     leading: LeadingState,
     /// What each hand applies to the object, filtered.
@@ -133,6 +137,7 @@ impl Coordinator {
         let object_row = law.parameters().selection.rows().first();
         Ok(Self {
             presses: object_row.is_some_and(|row| row.contains(&Control::Force)),
+            odometry: OdometryFrames::new(scenario, &law)?,
             law,
             resting_law: build_resting_law(run)?,
             references,
@@ -161,6 +166,7 @@ impl Coordinator {
             hybrid: HybridState::at_grasp(&self.sticks)?,
             motion: ObjectMotionState::at_rest(&Pose::identity()),
             clock: TeamClockState::default(),
+            odometry: OdometryState::default(),
             leading: LeadingState::at_start(None, &Pose::identity(), &[]),
             hand_wrench: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
@@ -199,7 +205,8 @@ impl Coordinator {
         out: &mut CoordinatorOutputs,
     ) -> Result<(), CoordinateError> {
         let CoordinatorScratch { law: law_scratch, law_output, hands, force_ref, position_ref } = scratch;
-        read_hands(robots.clone(), &self.hands_of_robots, hands)?;
+        let X_WO = state.odometry.frames().ok_or(CoordinateError::State)?;
+        read_hands(robots.clone(), &self.hands_of_robots, &X_WO, hands)?;
         let wishes = Wishes::of(robots.clone());
 
         let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
@@ -258,10 +265,14 @@ impl Coordinator {
         let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
         move_open_hands(state, &mut law_output.hands, hand_step_m);
 
-        self.write_commands(tick, state, &phase, law_output, out);
+        self.write_commands(tick, state, &phase, &X_WO, law_output, out);
         let reference = is_hybrid.then_some((&*force_ref, &*position_ref));
         write_team_state(state, &phase, law_output, reference, out);
+        out.team_state.odometry_pose = X_WO.map(|X_WO| X_WO.to_array());
         out.team_state.speed_share = speed_share;
+        if is_hybrid && !is_led && !state.clock.is_standing() {
+            self.correct_odometry(state, hands, law_output);
+        }
 
         if is_blind && !safety.is_blind() && carries {
             let X_WA = &law_output.position.external;
@@ -290,6 +301,21 @@ impl Coordinator {
             }
         }
         Ok(())
+    }
+
+    /// The team steps with the object in its hands, which tells how far robots' odometries have parted.
+    fn correct_odometry(&self, state: &mut CoordinatorState, hands: &[HandInput], law: &HybridOutput) {
+        let seen = odometry::Seen {
+            X_WA: &law.position.external,
+            hands,
+            hand_wrench: &state.hand_wrench,
+            shares: self.law.internal_forces().w_inverse(),
+            hands_of_robots: &self.hands_of_robots,
+            compliance: &self.compliance,
+        };
+        // A stick that is none was refused before anything changed.
+        let corrected = self.odometry.correct(&mut state.odometry, &mut state.hybrid, &seen);
+        debug_assert!(corrected.is_some(), "sticks were read in this tick");
     }
 
     /// What decides how the job goes on.
@@ -342,12 +368,14 @@ impl Coordinator {
         tick: u64,
         state: &CoordinatorState,
         phase: &Phase,
+        X_WO: &[Pose<World, Odometry>; MAX_ROBOTS],
         law: &HybridOutput,
         out: &mut CoordinatorOutputs,
     ) {
         let mut references = law.hands.iter();
-        let robots = self.hands_of_robots.iter().zip(&state.leading.clocks);
-        for (command, (&hands, own_clock)) in out.commands.iter_mut().zip(robots) {
+        let robots = self.hands_of_robots.iter().zip(&state.leading.clocks).zip(X_WO);
+        for (command, ((&hands, own_clock), X_WO)) in out.commands.iter_mut().zip(robots) {
+            let X_OW = X_WO.inverse();
             let clock = if self.leading.is_some() { own_clock } else { &state.clock };
             *command = TeamCommand {
                 team_mode: mode_of(state, phase),
@@ -357,9 +385,9 @@ impl Coordinator {
                 ..TeamCommand::zeroed()
             };
             for (hand, reference) in references.by_ref().take(hands.min(MAX_HANDS)).enumerate() {
-                command.hand_pose_ref[hand] = reference.pose.to_array();
-                command.hand_twist_ref[hand] = reference.twist.to_array();
-                command.hand_wrench_ref[hand] = reference.wrench.to_array();
+                command.hand_pose_ref[hand] = (X_OW * reference.pose).to_array();
+                command.hand_twist_ref[hand] = reference.twist.expressed_in(&X_OW).to_array();
+                command.hand_wrench_ref[hand] = reference.wrench.expressed_in(&X_OW).to_array();
             }
         }
     }
@@ -404,18 +432,21 @@ impl Default for CoordinatorOutputs {
     }
 }
 
+/// What robots say of their hands, each in its own frame O, in the world of the team.
 fn read_hands<'a>(
     robots: impl Iterator<Item = &'a RobotState>,
     hands_of_robots: &[usize],
+    X_WO: &[Pose<World, Odometry>; MAX_ROBOTS],
     hands: &mut Vec<HandInput>,
 ) -> Result<(), CoordinateError> {
     hands.clear();
-    for (robot, &count) in robots.zip(hands_of_robots) {
+    for ((robot, &count), X_WO) in robots.zip(hands_of_robots).zip(X_WO) {
         let poses = robot.hand_pose.iter().zip(&robot.hand_pose_commanded);
         for ((pose, commanded), wrench) in poses.zip(&robot.hand_wrench).take(count) {
-            let pose = Pose::<World, Hand>::from_array(pose).ok_or(CoordinateError::HandPose)?;
-            let pose_commanded = Pose::from_array(commanded).ok_or(CoordinateError::HandPose)?;
-            hands.push(HandInput { pose, pose_commanded, wrench: Wrench::from_array(wrench) });
+            let pose = Pose::<Odometry, Hand>::from_array(pose).ok_or(CoordinateError::HandPose)?;
+            let commanded = Pose::<Odometry, Hand>::from_array(commanded).ok_or(CoordinateError::HandPose)?;
+            let wrench = Wrench::<Odometry>::from_array(wrench).expressed_in(X_WO);
+            hands.push(HandInput { pose: *X_WO * pose, pose_commanded: *X_WO * commanded, wrench });
         }
     }
     Ok(())

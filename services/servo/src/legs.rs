@@ -58,6 +58,8 @@ pub(crate) struct Felt {
     pub com_velocity: Vector2<f64>,
     /// Base.
     pub base: Pose<World, Base>,
+    /// Soles, by encoders.
+    pub soles: PerFoot<Pose<World, Foot>>,
     /// Wrench of the ground on each foot, at the foot's origin.
     pub ground_wrench: PerFoot<Wrench<World>>,
     /// What the hands carry.
@@ -209,6 +211,7 @@ impl Legs {
                     Some(felt) => felt.ground_wrench[side].force.z,
                     None => self.foot_force_as_planned(&now.feet[side].pose),
                 }),
+                soles: felt.map(|felt| PerFoot::from_fn(|side| GroundPose::of(&felt.soles[side]))),
                 load,
             },
         );
@@ -216,12 +219,13 @@ impl Legs {
         self.shift_trust(state);
         self.correct_soles(state, &now, &next, felt);
 
+        let soles = PerFoot::from_fn(|side| next.feet[side].pose.displaced(&state.sole_correction[side]));
         let feet = PerFoot::from_fn(|side| {
-            let pose = next.feet[side].pose.displaced(&state.sole_correction[side]);
-            stabilisation.map_or(pose, |stabilisation| stabilisation.apply(side, &pose))
+            stabilisation.map_or(soles[side], |stabilisation| stabilisation.apply(side, &soles[side]))
         });
         let com_offset = stabilisation.map_or_else(Vector2::zeros, |stabilisation| stabilisation.com_offset);
-        let on_ground = PerFoot::from_fn(|side| GroundPose::of(&next.feet[side].pose));
+        // As soles are commanded and not where footholds are, which move when a foot lands: the waist would jerk.
+        let on_ground = PerFoot::from_fn(|side| GroundPose::of(&soles[side]));
         LegTargets {
             stance: next.stance,
             feet,
@@ -251,7 +255,7 @@ impl Legs {
     }
 
     /// What has sagged is lifted, and what has come to stand loses its correction; a foothold that is moved
-    /// to where it belongs gains one, so that the sole stays where it is.
+    /// to where the foot is or belongs gains one, so that the sole stays where it is.
     fn correct_soles(
         &self,
         state: &mut LegsState,

@@ -37,7 +37,7 @@ pub struct Servo {
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 4;
+pub(crate) const STATE_VERSION: u64 = 5;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,6 +107,7 @@ impl Servo {
                 com: kinematics.com().xy(),
                 com_velocity: Vector2::zeros(),
                 base: X_WB,
+                soles: PerFoot::from_fn(|side| kinematics.frame_pose(&robot.model, robot.soles[side])),
                 ground_wrench: PerFoot { right: Wrench::zero(), left: Wrench::zero() },
                 load: ExternalLoad::NONE,
             }),
@@ -274,7 +275,8 @@ impl Servo {
         out.zmp_position_m = zmp.into();
         out.zmp_margin_m = support.signed_distance(&zmp);
         out.capture_point_margin_m = support.signed_distance(&capture_point);
-        Felt { com: com.xy(), com_velocity, base: base.pose, ground_wrench, load }
+        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(model, robot.soles[side]));
+        Felt { com: com.xy(), com_velocity, base: base.pose, soles, ground_wrench, load }
     }
 
     /// Where the robot goes.

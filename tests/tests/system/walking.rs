@@ -15,3 +15,18 @@ fn teams_of_two_to_eight_robots_carry_for_twenty_seconds() {
         assert!(members.iter().all(|robot| robot["steps"].as_u64() > Some(20)), "all of them walk");
     }
 }
+
+/// Odometries part with every step, and by the way between them the object's turn would move hands against each
+/// other.
+#[test]
+fn robots_whose_odometries_part_know_it_by_the_object_that_all_hold() {
+    let results = Results::new();
+    let minute = ["--in-process", "--set", "duration_s=66", "--set", "motion.random.duration_s=60"];
+    let said = run(&of_project("wander"), &minute, &results);
+    let summary = results.summary();
+    assert_eq!(said.status, Some(0), "{:#}", summary["failures"]);
+    let last = summary["minutes"].as_array().and_then(|minutes| minutes.last()).expect("minutes");
+    let apart_m = |key: &str| last[key].as_f64().expect("a number");
+    assert!(apart_m("odometry_apart_m") > 0.008, "{last:#}");
+    assert!(apart_m("frames_apart_m") < 0.004, "{last:#}");
+}

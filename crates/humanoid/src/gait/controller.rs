@@ -79,7 +79,7 @@ pub struct GaitState {
     pub phase: GaitPhase,
     /// The foot that the body moves about: the one that stands, or of two the one that does next.
     pub stance: Side,
-    /// Where each foot stands, or last stood.
+    /// Where each foot stands, or last stood: once it has landed, where it was felt to land.
     pub feet: PerFoot<Foothold>,
     /// d₁, d₂ of Fig. 6, once there is a grasp.
     pub placement: Option<FootPlacement>,
@@ -102,6 +102,8 @@ pub struct GaitInputs {
     pub hand_centre: Option<HandCentre>,
     /// Measured vertical force on each foot \[N\].
     pub foot_force: PerFoot<f64>,
+    /// Where each sole is by encoders, from the base that the standing foot bears; as planned when absent.
+    pub soles: Option<PerFoot<GroundPose>>,
     /// The measured hands' load.
     pub load: ExternalLoad,
 }
@@ -241,7 +243,11 @@ impl Gait {
         let (duration, dt) = (self.seconds(timing.single_support), self.config.preview.control_period_s);
         let landed = state.phase.meet_ground(&self.config.swing, &inputs.foot_force, share, duration, dt);
         if let Some((side, foothold)) = landed {
-            state.feet[side] = foothold.on_plane_within(self.config.swing.plane_tolerance_m);
+            let foothold = foothold.on_plane_within(self.config.swing.plane_tolerance_m);
+            // A leg sags, and its foot lands some tenths of a millimetre from where it was sent, step for step
+            // on the same side: whoever believes that it stands where it was sent walks astray.
+            let pose = inputs.soles.map_or(foothold.pose, |soles| soles[side]);
+            state.feet[side] = Foothold { pose, ..foothold };
         }
         self.plan_step(state, inputs);
         state.stance = stance(&state.phase).unwrap_or(state.stance);

@@ -86,11 +86,27 @@ impl Robot {
     }
 
     pub fn act_under(&mut self, clock: StepClock, load: ExternalLoad) -> GaitReference {
+        self.act_where(clock, load, None)
+    }
+
+    /// With soles felt this far from where they are meant to be.
+    pub fn act_where(
+        &mut self,
+        clock: StepClock,
+        load: ExternalLoad,
+        off: Option<Vector2<f64>>,
+    ) -> GaitReference {
         let reference = self.gait.reference(&self.state);
         let foot_force = PerFoot::from_fn(|side| {
             if reference.feet[side].pose.translation.z <= self.ground_height + 1e-6 { 275.0 } else { 0.0 }
         });
-        let inputs = GaitInputs { clock, hand_centre: Some(self.centre), foot_force, load };
+        let soles = off.map(|off| {
+            PerFoot::from_fn(|side| {
+                let meant = GroundPose::of(&reference.feet[side].pose);
+                GroundPose { position: meant.position + off, ..meant }
+            })
+        });
+        let inputs = GaitInputs { clock, hand_centre: Some(self.centre), foot_force, soles, load };
         self.gait.act(&mut self.state, &inputs)
     }
 }

@@ -54,6 +54,7 @@ pub fn run(label: &str, kind: Kind) -> ReportedRun {
         internal: judged.internal,
         robots: judged.robots,
         drift_between_robots_m: judged.drift_between_robots_m,
+        minutes: judged.minutes,
         ..Summary::default()
     };
     let limit = |what: &str, measured: &str, is_met| JudgedLimit {

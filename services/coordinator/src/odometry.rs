@@ -1,0 +1,176 @@
+//! Where each robot's odometry has Σo, as the object that all hold tells.
+//!
+//! All that a robot says is in its own frame O, and so is all that it is told; `X_WO` leads across, and nothing
+//! else in the coordinator knows of O. When `X_WO` moves, so do the stored references of its robot's hands, so
+//! that what the robot is told stays where it is: a correction moves no hand and no foot, and the mean of all
+//! hands, where the object is, stays too. What changes is the way from then on: which way the robot is told to
+//! go, and how far from its hands the object turns.
+//!
+//! Odometry errs by steps, so frames move while the team steps, and rest while it stands. Where an internal row
+//! is under position control, hands are asked to part, and nothing tells that from odometry: frames rest.
+
+use crate::build::BuildCoordinatorError;
+use crate::grasp::GraspCompliance;
+use bytemuck::{Pod, Zeroable};
+use mikoshi_config::scenario::Scenario;
+use mikoshi_cooperation::{
+    Control, FrameCorrection, HandInput, HybridLaw, HybridState, Landmark, LandmarkParameters, Sighting,
+};
+use mikoshi_ipc_types::{MAX_HANDS_OF_TEAM, MAX_ROBOTS};
+use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Robots that walk with .04 m/s part by .25 mm/s, and by four times that where feet are believed to stand where
+/// they were sent: this leaves them 1 mm off, or 4. Their sway of some millimetres comes and goes with every second
+/// step of .8 s, and is averaged.
+const TIME_CONSTANT_S: f64 = 4.0;
+/// Several times what a robot that walks fast drifts.
+const LIMIT_M_S: f64 = 0.01;
+const LIMIT_RAD_S: f64 = 0.02;
+
+/// Keeps the robots' odometries together. Immutable.
+#[derive(Clone, Debug)]
+pub(crate) struct OdometryFrames {
+    /// Absent where the scenario turns it off, or nothing would tell drift from what is asked for.
+    landmark: Option<Landmark>,
+}
+
+/// O in Σo, robot by robot.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct OdometryState {
+    frames: [LevelFrame; MAX_ROBOTS],
+}
+
+/// A frame on level ground: what is stored can't tilt.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct LevelFrame {
+    x_m: f64,
+    y_m: f64,
+    yaw_rad: f64,
+}
+
+// SAFETY: zeros are a valid value of floats.
+unsafe impl Zeroable for LevelFrame {}
+// SAFETY: `repr(C)` over floats only: no padding, any bit pattern valid.
+unsafe impl Pod for LevelFrame {}
+// SAFETY: as above.
+unsafe impl Zeroable for OdometryState {}
+// SAFETY: as above.
+unsafe impl Pod for OdometryState {}
+
+impl Default for OdometryState {
+    /// As long as nobody has walked all agree.
+    fn default() -> Self {
+        Self { frames: [LevelFrame::default(); MAX_ROBOTS] }
+    }
+}
+
+impl OdometryState {
+    /// `X_WO` of each robot; `None` if one is none.
+    pub(crate) fn frames(&self) -> Option<[Pose<World, Odometry>; MAX_ROBOTS]> {
+        let mut poses = [Pose::identity(); MAX_ROBOTS];
+        for (pose, frame) in poses.iter_mut().zip(&self.frames) {
+            *pose = frame.pose()?;
+        }
+        Some(poses)
+    }
+}
+
+impl LevelFrame {
+    fn pose(&self) -> Option<Pose<World, Odometry>> {
+        let Self { x_m, y_m, yaw_rad } = *self;
+        let is_valid = [x_m, y_m, yaw_rad].iter().all(|value| value.is_finite());
+        let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+        is_valid.then(|| Pose::new(Vector3::new(x_m, y_m, 0.0), rotation))
+    }
+
+    fn corrected(&self, correction: &FrameCorrection) -> Self {
+        let moved = correction.motion().transform_point(&Vector3::new(self.x_m, self.y_m, 0.0));
+        Self { x_m: moved.x, y_m: moved.y, yaw_rad: self.yaw_rad + correction.yaw }
+    }
+}
+
+impl OdometryFrames {
+    /// Of this scenario's team under this law.
+    pub(crate) fn new(scenario: &Scenario, law: &HybridLaw) -> Result<Self, BuildCoordinatorError> {
+        let mut internal = law.parameters().selection.rows().iter().skip(1);
+        let parts_hands = internal.any(|row| row.contains(&Control::Position));
+        let landmark = Landmark::new(&LandmarkParameters {
+            period_s: scenario.control_period_s,
+            time_constant_s: TIME_CONSTANT_S,
+            limit_m_s: LIMIT_M_S,
+            limit_rad_s: LIMIT_RAD_S,
+        })?;
+        Ok(Self { landmark: (scenario.odometry.landmark && !parts_hands).then_some(landmark) })
+    }
+
+    /// One tick of a team that steps with its object in its hands. `None`, and nothing has changed, if a stick
+    /// is none.
+    pub(crate) fn correct(
+        &self,
+        state: &mut OdometryState,
+        hybrid: &mut HybridState<MAX_HANDS_OF_TEAM>,
+        seen: &Seen<'_>,
+    ) -> Option<()> {
+        let Some(landmark) = &self.landmark else { return Some(()) };
+        let mut sightings = [Sighting::default(); MAX_ROBOTS];
+        let mut arms = 0..0;
+        for (sighting, &count) in sightings.iter_mut().zip(seen.hands_of_robots) {
+            arms = arms.end..arms.end + count;
+            *sighting = seen.sighting(hybrid, arms.clone())?;
+        }
+        let sightings = sightings.get(..seen.hands_of_robots.len())?;
+        let mut references = hybrid.hand_pose_ref.iter_mut();
+        let robots = state.frames.iter_mut().zip(seen.hands_of_robots);
+        for ((frame, &count), correction) in robots.zip(landmark.corrections(sightings)) {
+            *frame = frame.corrected(&correction);
+            for array in references.by_ref().take(count) {
+                // Where they are none the law says so in the next tick.
+                if let Some(X_WH) = Pose::<World, Hand>::from_array(array) {
+                    *array = (correction.motion() * X_WH).to_array();
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+/// What the team sees of the object in a tick.
+pub(crate) struct Seen<'a> {
+    /// The object, by the mean of all tips.
+    pub X_WA: &'a Pose<World, Object>,
+    /// All hands, in hand order.
+    pub hands: &'a [HandInput],
+    /// What each applies, filtered.
+    pub hand_wrench: &'a [[f64; 6]],
+    /// Weight of each tip in the mean of all (W⁻).
+    pub shares: &'a [f64],
+    /// Hands of each robot.
+    pub hands_of_robots: &'a [usize],
+    /// How grasps yield.
+    pub compliance: &'a GraspCompliance,
+}
+
+impl Seen<'_> {
+    /// Of the robot whose arms these are.
+    fn sighting(
+        &self,
+        hybrid: &HybridState<MAX_HANDS_OF_TEAM>,
+        arms: core::ops::Range<usize>,
+    ) -> Option<Sighting> {
+        let (mut weight, mut tips, mut deviation) = (0.0, Vector3::zeros(), Twist::zero());
+        let each = 1.0 / arms.len() as f64;
+        for arm in arms {
+            let (stick, hand) = (hybrid.stick(arm)?, self.hands.get(arm)?);
+            let wrench = Wrench::from_array(self.hand_wrench.get(arm)?);
+            let X_WB = stick.tip_pose(&hand.pose);
+            let yielded = self.compliance.tip_yield(&hand.pose, &stick, &wrench);
+            weight += self.shares.get(arm)?;
+            tips += X_WB.translation * each;
+            deviation += (self.X_WA.displacement_to(&X_WB.relabel()) + yielded) * each;
+        }
+        Some(Sighting { weight, tips, deviation })
+    }
+}
