@@ -178,10 +178,13 @@ fn strike(strikes: &[Strike], period_s: f64, attempt: &mut Attempt, interrupts: 
     let mut struck = 0;
     while !is_over() {
         let tick = board.last_position(ServiceId::Bridge).unwrap_or_default().tick;
-        if let Some(strike) = strikes.next_if(|strike| tick >= strike.tick) {
-            let is_running =
-                board.states().any(|state| state == (Role::Service(strike.victim), State::Running));
-            let process = board.process_of(strike.victim).filter(|_| is_running);
+        // Who is just taking over is struck as soon as it has.
+        let is_due = |strike: &&Strike| {
+            let running = (Role::Service(strike.victim), State::Running);
+            tick >= strike.tick && board.states().any(|state| state == running)
+        };
+        if let Some(strike) = strikes.next_if(is_due) {
+            let process = board.process_of(strike.victim);
             let pid = process.and_then(|process| Pid::from_raw(i32::try_from(process.pid).ok()?));
             let signal = if strike.blow == Blow::Kill { Signal::KILL } else { Signal::STOP };
             if let Some(pid) = pid.filter(|&pid| kill_process(pid, signal).is_ok()) {
