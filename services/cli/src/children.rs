@@ -317,6 +317,11 @@ impl ServiceProcess {
         self.ended
     }
 
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// The signal that it died of.
     pub fn signal(&self) -> Option<i32> {
         self.ended.and_then(|ended| ended.status.signal())

@@ -32,6 +32,9 @@ const LOOK: Duration = Duration::from_millis(1);
 /// A run in which no service gets on for so long is stuck. A tick takes milliseconds, and its longest
 /// phase, the physics of sixteen robots, tens of them; a busy machine stalls for up to a second.
 const STALL: Duration = Duration::from_secs(3);
+/// A service without a standby that is so far behind the clock is taken to be frozen: what queues up for its
+/// successor is four times as much in most runs.
+const PATIENCE: Duration = Duration::from_millis(40);
 /// The same while services set themselves up: worlds are built and memory is touched.
 const START_STALL: Duration = Duration::from_secs(30);
 
@@ -185,6 +188,7 @@ impl Supervisor {
         self.children.look();
         self.requests.look(run, self.member.board(), &mut self.children, observer);
         self.see_to_standbys(prepared, observer);
+        self.see_to_frozen(prepared, observer);
         let fallen = self.children.processes().iter().filter(|process| {
             let service = process.service;
             let has_failed = process.ended.is_some_and(|ended| !ended.status.success());
@@ -266,6 +270,41 @@ impl Supervisor {
                 self.ask_for_standby(service, "the standby ended".to_owned());
             }
         }
+    }
+
+    /// Has those replaced that are behind the clock and have no standby, while their successors can still make up
+    /// for it; or goes on without them.
+    fn see_to_frozen(&mut self, prepared: &Prepared, observer: &mut RunObserver) {
+        let Clock::Wall { period_ns } = prepared.schedule.clock() else { return };
+        let patience_ticks = PATIENCE.as_nanos() as u64 / period_ns.max(1) + 2;
+        let world = self.last_position(ServiceId::Bridge).0.tick;
+        let is_behind = |at: Position| at.tick.saturating_add(patience_ticks) < world;
+        let behind = self.member.board().positions().filter(|(_, at)| is_behind(*at));
+        for (service, at) in behind.collect::<Vec<_>>() {
+            let process = self.children.processes().iter().find(|process| process.service == service);
+            let is_seen_to = process.is_none_or(|process| process.ended.is_some())
+                || self.succession.is_due(service)
+                || self.requests.is_pending(service)
+                || self.children.has_standby(service)
+                || self.lost.contains(&service)
+                || self.is_starting(service);
+            if is_seen_to {
+                continue;
+            }
+            self.children.kill_frozen(&[service]);
+            if !self.succession.take_note(service, at, "fell behind".to_owned()) {
+                self.give_up(prepared, service, at.tick, observer);
+            }
+        }
+    }
+
+    /// Whether a process has this place that does not execute ticks yet.
+    fn is_starting(&self, service: ServiceId) -> bool {
+        self.service_states().any(|(other, state)| other == service && state < State::Running)
+            || self.children.processes().iter().any(|process| {
+                process.service == service
+                    && self.member.board().process_of(service).map(|owner| owner.pid) != Some(process.id())
+            })
     }
 
     fn ask_for_standby(&mut self, service: ServiceId, cause: String) {
