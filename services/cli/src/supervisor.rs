@@ -273,9 +273,12 @@ impl Supervisor {
     }
 
     /// Has those replaced that are behind the clock and have no standby, while their successors can still make up
-    /// for it; or goes on without them.
+    /// for it. Where nobody is replaced they may still come back.
     fn see_to_frozen(&mut self, prepared: &Prepared, observer: &mut RunObserver) {
         let Clock::Wall { period_ns } = prepared.schedule.clock() else { return };
+        if !self.succession.is_promised() {
+            return;
+        }
         let patience_ticks = PATIENCE.as_nanos() as u64 / period_ns.max(1) + 2;
         let world = self.last_position(ServiceId::Bridge).0.tick;
         let is_behind = |at: Position| at.tick.saturating_add(patience_ticks) < world;

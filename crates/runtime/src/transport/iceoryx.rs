@@ -14,7 +14,7 @@ use crate::member::{Member, TAP_LEAD_TICKS};
 use crate::pace::Pace;
 use crate::shared_memory::populate;
 use crate::wait::Reason;
-use crate::{Domain, DomainError, Position, Replaceable, Session, TickError, TickSchedule, Topic};
+use crate::{Clock, Domain, DomainError, Position, Replaceable, Session, TickError, TickSchedule, Topic};
 use core::cell::{Cell, RefCell};
 use core::mem::MaybeUninit;
 use iceoryx2::port::LoanError;
@@ -61,11 +61,16 @@ pub fn required_bytes(schedule: &TickSchedule) -> u64 {
     const OVERHEAD_BYTES: usize = 64 << 10;
     /// Of a sample: iceoryx2's header and alignment.
     const HEADER_BYTES: usize = 64;
+    let publishers = match schedule.clock() {
+        Clock::Lockstep => 1,
+        // With a standby.
+        Clock::Wall { .. } => 2,
+    };
     schedule
         .outputs()
         .map(|(_, output)| {
             let frame = output.size_bytes + size_of::<Envelope>() + HEADER_BYTES;
-            (frames_of_publisher(schedule, output.topic) * frame + OVERHEAD_BYTES) as u64
+            (publishers * (frames_of_publisher(schedule, output.topic) * frame + OVERHEAD_BYTES)) as u64
         })
         .sum()
 }
