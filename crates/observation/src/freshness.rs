@@ -24,14 +24,13 @@ impl Freshness {
     /// Takes in one tick.
     pub fn observe(&mut self, observation: &Observation) {
         let tick = observation.tick();
-        let is_current = |found: u64| found == tick;
         for (robot, frame) in observation.sensors.iter().enumerate() {
             // What was used in the tick before.
-            if is_current(frame.envelope.tick) && tick > 0 && frame.payload.next_joint_command_tick < tick {
+            if observation.is_of_tick(frame) && tick > 0 && frame.payload.next_joint_command_tick < tick {
                 self.missing.entry(ServiceId::Servo(robot)).or_default().insert(tick - 1);
             }
         }
-        for frame in observation.joint_command.iter().filter(|frame| is_current(frame.envelope.tick)) {
+        for frame in observation.joint_command.iter().filter(|frame| observation.is_of_tick(frame)) {
             let expected = (tick + 1).saturating_sub(self.delay_ticks);
             if frame.payload.next_team_command_tick < expected {
                 self.missing.entry(ServiceId::Coordinator).or_default().insert(tick);

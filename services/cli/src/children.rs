@@ -105,12 +105,8 @@ impl Children {
     /// # Errors
     /// As [`Children::spawn`].
     pub fn nominate(&mut self, service: ServiceId, variant: Variant) -> Result<(), Failure> {
-        let Some(process) = self.processes.iter().find(|process| process.service == service) else {
-            return Ok(());
-        };
-        let (label, robot) = (process.label.clone(), process.robot.clone());
-        let candidate = self.start(service, label, robot, variant, &[OsStr::new("--replace")])?;
-        self.candidates.push(candidate);
+        let candidate = self.start_beside(service, variant, "--replace")?;
+        self.candidates.extend(candidate);
         Ok(())
     }
 
@@ -119,13 +115,24 @@ impl Children {
     /// # Errors
     /// As [`Children::spawn`].
     pub fn stand_by(&mut self, service: ServiceId) -> Result<(), Failure> {
-        let Some(process) = self.processes.iter().find(|process| process.service == service) else {
-            return Ok(());
-        };
-        let (label, robot, variant) = (process.label.clone(), process.robot.clone(), process.variant.clone());
-        let standby = self.start(service, label, robot, variant, &[OsStr::new("--standby")])?;
-        self.standbys.push(standby);
+        let standby = self.start_beside(service, self.variant(service), "--standby")?;
+        self.standbys.extend(standby);
         Ok(())
+    }
+
+    /// Starts a second process of a service, which is told by `entry` when it is to take over.
+    fn start_beside(
+        &self,
+        service: ServiceId,
+        variant: Variant,
+        entry: &str,
+    ) -> Result<Option<ServiceProcess>, Failure> {
+        let process = self.processes.iter().find(|process| process.service == service);
+        process
+            .map(|ServiceProcess { label, robot, .. }| {
+                self.start(service, label.clone(), robot.clone(), variant, &[OsStr::new(entry)])
+            })
+            .transpose()
     }
 
     /// Whether a standby of this service lives.

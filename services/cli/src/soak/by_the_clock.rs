@@ -1,6 +1,6 @@
 //! A run in wall-clock time whose processes are killed and frozen while their standbys wait.
 
-use super::{Attempt, LOOK, left_behind};
+use super::{Attempt, LOOK, board_of, left_behind};
 use crate::arguments::SoakArguments;
 use crate::failure::{Failure, Status};
 use crate::interrupts::Interrupts;
@@ -12,7 +12,7 @@ use core::fmt::Write as _;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::Summary;
-use mikoshi_runtime::{Board, Role, State};
+use mikoshi_runtime::{Role, State};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rustix::process::{Pid, Signal, kill_process};
@@ -167,13 +167,7 @@ fn strike(strikes: &[Strike], period_s: f64, attempt: &mut Attempt, interrupts: 
     let directory = attempt.directory();
     let mut is_over =
         || matches!(attempt.child.try_wait(), Ok(Some(_)) | Err(_)) || interrupts.received().is_some();
-    let board = loop {
-        match Board::open(&directory) {
-            Ok(board) => break board,
-            Err(_) if is_over() => return 0,
-            Err(_) => pause(LOOK),
-        }
-    };
+    let Some(board) = board_of(&directory, &mut is_over) else { return 0 };
     let thaw_ticks = (THAW_S / period_s).round() as u64;
     let mut strikes = strikes.iter().peekable();
     let mut frozen: Vec<(u64, Pid)> = vec![];

@@ -190,13 +190,7 @@ impl Watch<'_> {
     fn strike_and_wait(&mut self, strikes: &[Strike], child: &mut Child, interrupts: &Interrupts) {
         let mut is_over =
             || matches!(child.try_wait(), Ok(Some(_)) | Err(_)) || interrupts.received().is_some();
-        let board = loop {
-            match Board::open(&self.directory) {
-                Ok(board) => break board,
-                Err(_) if is_over() => return,
-                Err(_) => pause(LOOK),
-            }
-        };
+        let Some(board) = board_of(&self.directory, &mut is_over) else { return };
         let (clock, mut since_sample) = (Stopwatch::start(), Stopwatch::start());
         let mut strikes = strikes.iter().peekable();
         let mut repeated: Vec<(ServiceId, u64)> = vec![];
@@ -238,6 +232,17 @@ impl Watch<'_> {
             self.kills.push(Kill { service: label_of(self.run, service), tick, phase, is_repeated });
         }
         is_killed
+    }
+}
+
+/// The board of the run in this directory, as soon as there is one; none if the run is over before.
+fn board_of(directory: &Path, mut is_over: impl FnMut() -> bool) -> Option<Board> {
+    loop {
+        match Board::open(directory) {
+            Ok(board) => return Some(board),
+            Err(_) if is_over() => return None,
+            Err(_) => pause(LOOK),
+        }
     }
 }
 
