@@ -29,6 +29,7 @@ mod report;
 mod requests;
 mod revise;
 mod soak;
+mod stamps;
 mod standstill;
 mod succession;
 mod supervisor;

@@ -8,10 +8,9 @@ use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
 use crate::print::print_error;
 use crate::progress::Progress;
+use crate::stamps::Stamps;
 use crate::wall_clock::Stopwatch;
-use core::time::Duration;
 use mikoshi_config::RunSpec;
-use mikoshi_config::scenario::Clock;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
     Fault, Figures, Freshness, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
@@ -49,7 +48,7 @@ impl RunObserver {
             hash: LogHash::default(),
             log: log.transpose().map_err(Failure::fault)?,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, !arguments.quiet),
-            stamps: Stamps::default(),
+            stamps: Stamps::new(run.scenario.clock, run.scenario.control_period_s),
             freshness: Freshness::with_delay(run.scenario.coordination_delay_ticks),
             frames_lost: 0,
             swaps: vec![],
@@ -146,7 +145,7 @@ impl RunObserver {
             timing: Timing {
                 ticks_held: self.freshness.ticks_held(),
                 frames_lost: self.frames_lost,
-                ..self.stamps.timing(scenario.clock, scenario.control_period_s)
+                ..self.stamps.timing()
             },
             faults: [self.stops.faults, faults].concat(),
             swaps: self.swaps.into_iter().map(count_lost).collect(),
@@ -184,64 +183,5 @@ impl Stops {
         let of_robot = robot.as_ref().map_or_else(String::new, |robot| format!(", robot {robot}"));
         print_error(&as_lines("warning", &format!("safe stop in tick {tick}: {code}{of_robot}")));
         self.faults.push(Fault { tick, service: "coordinator".to_owned(), robot, code });
-    }
-}
-
-/// A tick is late if it took more than so many periods.
-const LATE: f64 = 1.1;
-
-/// When ticks began, by the bridge's clock.
-#[derive(Default)]
-struct Stamps {
-    last_ns: Option<u64>,
-    periods_ns: Vec<u64>,
-}
-
-impl Stamps {
-    fn observe(&mut self, stamp_ns: u64) {
-        if let Some(last_ns) = self.last_ns.replace(stamp_ns) {
-            self.periods_ns.push(stamp_ns.saturating_sub(last_ns));
-        }
-    }
-
-    /// All zero where no clock was read; in lockstep nothing is late.
-    fn timing(mut self, clock: Clock, period_s: f64) -> Timing {
-        self.periods_ns.sort_unstable();
-        let late_ns = LATE * period_s * 1e9;
-        let ticks_late = match clock {
-            Clock::Lockstep => 0,
-            Clock::Wall => self.periods_ns.iter().filter(|period_ns| **period_ns as f64 > late_ns).count(),
-        };
-        let quantile = |share: f64| {
-            let last = self.periods_ns.len().saturating_sub(1);
-            let index = (share * last as f64).round() as usize;
-            Duration::from_nanos(self.periods_ns.get(index).copied().unwrap_or_default()).as_secs_f64()
-        };
-        Timing {
-            tick_p50_s: quantile(0.5),
-            tick_p99_s: quantile(0.99),
-            ticks_late: ticks_late as u64,
-            ..Timing::default()
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quantiles_are_those_of_the_periods_between_stamps() {
-        let mut stamps = Stamps::default();
-        let mut stamp_ns = 1_000;
-        stamps.observe(stamp_ns);
-        for period_ns in (1..=100).rev() {
-            stamp_ns += period_ns;
-            stamps.observe(stamp_ns);
-        }
-        let timing = stamps.timing(Clock::Wall, 90.5e-9);
-        assert_eq!((timing.tick_p50_s, timing.tick_p99_s), (51e-9, 99e-9));
-        assert_eq!(timing.ticks_late, 1, "one took more than a tenth longer than its period");
-        assert_eq!(Stamps::default().timing(Clock::Lockstep, 0.005), Timing::default());
     }
 }

@@ -1,12 +1,12 @@
 //! How the memory of processes grows with time.
 
-use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::Role;
 use std::collections::BTreeMap;
 
 /// Memory of every process of a run, sampled.
 #[derive(Debug, Default)]
 pub struct Memory {
-    samples: BTreeMap<(ServiceId, u32), Vec<Sample>>,
+    samples: BTreeMap<(Role, u32), Vec<Sample>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -21,27 +21,27 @@ const WARM_UP: usize = 5;
 const LEAST_SAMPLES: usize = 10;
 
 impl Memory {
-    /// Takes note of what the process of a service occupies now.
-    pub fn sample(&mut self, service: ServiceId, pid: u32, seconds: f64) {
+    /// Takes note of what the process in this role occupies now.
+    pub fn sample(&mut self, role: Role, pid: u32, seconds: f64) {
         if let Some(kib) = resident_kib(pid) {
-            self.samples.entry((service, pid)).or_default().push(Sample { seconds, kib });
+            self.samples.entry((role, pid)).or_default().push(Sample { seconds, kib });
         }
     }
 
-    /// What each service's longest-lived process occupies in the end \[KiB\], and how fast that grows
-    /// \[KiB/min\]; services without a process that lived long enough are left out.
-    pub fn slopes(&self) -> Vec<(ServiceId, f64, f64)> {
-        let mut longest: BTreeMap<ServiceId, &[Sample]> = BTreeMap::new();
-        for ((service, _), samples) in &self.samples {
+    /// What each role's longest-lived process occupies in the end \[KiB\], and how fast that grows \[KiB/min\];
+    /// roles without a process that lived long enough are left out.
+    pub fn slopes(&self) -> Vec<(Role, f64, f64)> {
+        let mut longest: BTreeMap<Role, &[Sample]> = BTreeMap::new();
+        for ((role, _), samples) in &self.samples {
             let samples = samples.get(WARM_UP..).unwrap_or_default();
-            let best = longest.entry(*service).or_default();
+            let best = longest.entry(*role).or_default();
             if samples.len() > best.len() {
                 *best = samples;
             }
         }
         let slopes = longest.into_iter().filter(|(_, samples)| samples.len() >= LEAST_SAMPLES);
         slopes
-            .map(|(service, samples)| (service, samples[samples.len() - 1].kib, 60.0 * slope(samples)))
+            .map(|(role, samples)| (role, samples[samples.len() - 1].kib, 60.0 * slope(samples)))
             .collect()
     }
 }
@@ -86,7 +86,7 @@ mod tests {
         let mut memory = Memory::default();
         for second in 0..WARM_UP + LEAST_SAMPLES {
             assert_eq!(memory.slopes(), []);
-            memory.sample(ServiceId::Bridge, std::process::id(), second as f64);
+            memory.sample(Role::Supervisor, std::process::id(), second as f64);
         }
         assert_eq!(memory.slopes().len(), 1);
     }

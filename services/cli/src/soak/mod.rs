@@ -210,8 +210,8 @@ impl Watch<'_> {
             }
             if since_sample.elapsed() >= MEMORY_PERIOD {
                 since_sample.lap();
-                for (service, pid) in processes(&board) {
-                    self.memory.sample(service, pid, clock.elapsed().as_secs_f64());
+                for (role, pid) in processes(&board) {
+                    self.memory.sample(role, pid, clock.elapsed().as_secs_f64());
                 }
             }
             pause(LOOK);
@@ -222,7 +222,8 @@ impl Watch<'_> {
     fn kill(&mut self, board: &Board, service: ServiceId, is_repeated: bool) -> bool {
         let is_running = board.states().any(|state| state == (Role::Service(service), State::Running));
         let mut processes = processes(board).into_iter();
-        let process = processes.find(|(other, pid)| *other == service && !self.killed.contains(pid));
+        let process =
+            processes.find(|(role, pid)| *role == Role::Service(service) && !self.killed.contains(pid));
         let Some((_, number)) = process.filter(|_| is_running) else { return false };
         let pid = i32::try_from(number).ok().and_then(Pid::from_raw);
         let is_killed = pid.is_some_and(|pid| kill_process(pid, Signal::KILL).is_ok());
@@ -246,14 +247,11 @@ fn board_of(directory: &Path, mut is_over: impl FnMut() -> bool) -> Option<Board
     }
 }
 
-fn processes(board: &Board) -> Vec<(ServiceId, u32)> {
-    let statuses = board.statuses().into_iter().filter(|status| status.alive);
-    statuses
-        .filter_map(|status| match status.role {
-            Role::Service(service) => Some((service, status.process?.pid)),
-            _ => None,
-        })
-        .collect()
+/// All that live; the tap is a part of the supervisor.
+fn processes(board: &Board) -> Vec<(Role, u32)> {
+    let statuses = board.statuses().into_iter();
+    let living = statuses.filter(|status| status.alive && status.role != Role::Tap);
+    living.filter_map(|status| Some((status.role, status.process?.pid))).collect()
 }
 
 /// What the run in this directory has left in shared memory.
@@ -287,8 +285,11 @@ fn judge(
     }
     let of_run = disturbed["failures"].as_array().into_iter().flatten().filter_map(Value::as_str);
     failures.extend(of_run.map(str::to_owned));
-    let memory = memory.slopes().into_iter().map(|(service, resident_kib, growth_kib_per_min)| MemoryRow {
-        service: label_of(run, service),
+    let memory = memory.slopes().into_iter().map(|(role, resident_kib, growth_kib_per_min)| MemoryRow {
+        service: match role {
+            Role::Service(service) => label_of(run, service),
+            role => role.to_string(),
+        },
         resident_kib,
         growth_kib_per_min,
     });
