@@ -147,6 +147,24 @@ impl Running {
             .collect()
     }
 
+    /// Waits until so many processes of the run stand by.
+    pub fn wait_for_standbys(&self, count: usize) {
+        let of_run = self.directory();
+        let is_standby = |line: &[u8]| {
+            let arguments = line.split(|byte| *byte == 0);
+            let has = |text: &[u8]| arguments.clone().any(|argument| argument == text);
+            has(b"--standby") && has(of_run.as_os_str().as_encoded_bytes())
+        };
+        let stand_by = || {
+            let processes = fs::read_dir("/proc").expect("/proc is there").flatten();
+            let lines = processes.filter_map(|process| fs::read(process.path().join("cmdline")).ok());
+            lines.filter(|line| is_standby(line)).count()
+        };
+        while stand_by() < count {
+            yield_now();
+        }
+    }
+
     /// Sends a signal to a service's process.
     pub fn signal_service(&self, service: ServiceId, signal: Signal) {
         let found = self.services().into_iter().find(|(id, _)| *id == service);

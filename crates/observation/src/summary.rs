@@ -10,6 +10,9 @@ pub struct Summary {
     pub scenario: String,
     pub seed: u64,
     pub ticks: u64,
+    /// The first tick that was seen: 0, unless the run was adopted. All figures are of what was seen.
+    #[serde(default)]
+    pub first_tick: u64,
     pub control_period_s: f64,
     pub sim_time_s: f64,
     pub wall_time_s: f64,

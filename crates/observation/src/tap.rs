@@ -83,6 +83,11 @@ impl<T: Tap> TeamTap<T> {
         Ok(true)
     }
 
+    /// Begins with this tick: of those before it is not known what is missing.
+    pub fn begin_at(&mut self, tick: u64) {
+        self.tick = tick;
+    }
+
     /// Nothing more will come: in wall-clock time, what is missing is lost.
     pub fn give_up_waiting(&mut self) {
         self.patience_ticks = self.patience_ticks.map(|_| 0);

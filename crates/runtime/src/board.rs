@@ -454,6 +454,12 @@ impl Board {
         self.index_of(Role::Service(service)).and_then(|index| self.slots()[index].process())
     }
 
+    /// Whether a supervisor looks after the run.
+    pub fn is_supervised(&self) -> bool {
+        let supervisor = self.index_of(Role::Supervisor).map(|index| &self.slots()[index]);
+        supervisor.is_some_and(|slot| slot.living_owner().is_some())
+    }
+
     /// Where all services are.
     pub fn positions(&self) -> impl Iterator<Item = (ServiceId, Position)> {
         self.slots().iter().filter_map(|slot| match slot.role()? {

@@ -31,7 +31,7 @@ pub use board::{Board, BoardError, Role, SlotStatus, State};
 pub use domain::{Domain, DomainError};
 pub use error::{FaultCode, TickError};
 pub use member::{Entry, JoinError, Member, TAP_LEAD_TICKS};
-pub use process::ProcessIdentity;
+pub use process::{ProcessIdentity, ProcessWatch};
 pub use real_time::{MissingRight, OnMissingRight, RealTime};
 pub use run_directory::{FoundRun, RunDirectory, RunDirectoryError};
 pub use runner::{Participant, Replaceable, RunFault, Session, run_in_one_thread, run_service};

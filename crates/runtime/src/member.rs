@@ -379,6 +379,17 @@ impl Member {
         }
     }
 
+    /// Whether all services that live are connected to it since it is in charge.
+    pub(crate) fn is_welcome(&self) -> bool {
+        let generation = self.charge_generation.get();
+        self.board.slots().iter().enumerate().all(|(index, slot)| match slot.role() {
+            Some(Role::Service(_)) => {
+                slot.has_welcomed(generation) || slot.state().has_ended() || self.has_exited(index)
+            }
+            _ => true,
+        })
+    }
+
     /// Whether all services have said that they have ended.
     pub(crate) fn all_services_have_ended(&self) -> bool {
         self.board.slots().iter().all(|slot| match slot.role() {
@@ -407,10 +418,11 @@ impl Member {
                     let is_consequence = slot.fault_code() == Some(FaultCode::PeerLost);
                     failed = failed.into_iter().chain([(is_consequence, service)]).min();
                 }
-                // Its successor is on the way, unless whoever sends it is gone: the supervisor comes first.
+                // Its successor is on the way, unless nobody is there who sends it: the supervisor comes first.
                 (Some(Role::Service(_)), _)
                     if has_exited && self.board.succession_is_promised() && !supervisor_is_lost => {}
                 (Some(Role::Service(service)), _) if has_exited => return Err(TickError::PeerLost(service)),
+                // The run goes on: another may adopt it.
                 (Some(Role::Supervisor), state) => supervisor_is_lost = has_exited || state == State::Failed,
                 (Some(Role::Tap), state) if has_exited && state < State::Done => {
                     slot.set_state(State::Failed)
@@ -419,7 +431,7 @@ impl Member {
             }
         }
         match failed {
-            _ if supervisor_is_lost => Err(TickError::SupervisorLost),
+            _ if supervisor_is_lost && !self.has_begun() => Err(TickError::SupervisorLost),
             _ if self.board.stop_is_requested() => Err(TickError::Stopped),
             Some((_, service)) => Err(TickError::PeerLost(service)),
             None => Ok(()),
@@ -430,6 +442,10 @@ impl Member {
     fn look_at_world(&self) -> Result<(), TickError> {
         if self.board.stop_is_requested() {
             return Err(TickError::Stopped);
+        }
+        let supervisor = self.board.index_of(Role::Supervisor);
+        if !self.has_begun() && supervisor.is_some_and(|index| self.has_exited(index)) {
+            return Err(TickError::SupervisorLost);
         }
         let world = ServiceId::Bridge;
         let Some(index) = self.board.index_of(Role::Service(world)).filter(|index| *index != self.slot)
@@ -444,6 +460,12 @@ impl Member {
             _ if has_exited => Err(TickError::PeerLost(world)),
             _ => Ok(()),
         }
+    }
+
+    /// Whether there is something to go on with: before its first tick a run without a supervisor, who may not have
+    /// started all others, comes to nothing.
+    fn has_begun(&self) -> bool {
+        !self.is_first || self.slot().state() >= State::Running
     }
 
     /// Whether a process had this slot and is gone.

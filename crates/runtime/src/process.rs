@@ -3,7 +3,7 @@
 use core::fmt;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::OwnedFd;
-use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use std::io;
 
 /// A process that can't be mistaken for a later one with the same pid.
@@ -81,14 +81,16 @@ fn start_time(stat: &str) -> Option<u64> {
 
 /// A hold on a process, by which its end is seen without reading `/proc` and even if its parent does
 /// not collect it.
-pub(crate) struct ProcessWatch {
+#[derive(Debug)]
+pub struct ProcessWatch {
     identity: ProcessIdentity,
     /// None if it was gone before it could be watched.
     descriptor: Option<OwnedFd>,
 }
 
 impl ProcessWatch {
-    pub(crate) fn new(identity: ProcessIdentity) -> Self {
+    /// Of this process.
+    pub fn new(identity: ProcessIdentity) -> Self {
         let pid = i32::try_from(identity.pid).ok().and_then(Pid::from_raw);
         let descriptor = pid
             .and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok())
@@ -97,11 +99,21 @@ impl ProcessWatch {
         Self { identity, descriptor }
     }
 
-    pub(crate) fn identity(&self) -> ProcessIdentity {
+    /// Which process it is.
+    pub fn identity(&self) -> ProcessIdentity {
         self.identity
     }
 
-    pub(crate) fn has_exited(&self) -> bool {
+    /// Kills it, if it still runs; no other process can be hit.
+    pub fn kill(&self) {
+        if let Some(descriptor) = &self.descriptor {
+            // It fails for a process that has just ended, which is what is wanted.
+            let _ = pidfd_send_signal(descriptor, Signal::KILL);
+        }
+    }
+
+    /// Whether it has ended.
+    pub fn has_exited(&self) -> bool {
         let Some(descriptor) = &self.descriptor else { return true };
         let mut descriptors = [PollFd::new(descriptor, PollFlags::IN)];
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
@@ -137,6 +149,18 @@ mod tests {
         assert!(watch.has_exited());
         assert!(ProcessWatch::new(identity).has_exited());
         child.wait().expect("it can be collected");
+    }
+
+    #[test]
+    fn a_process_that_is_watched_can_be_killed() {
+        let mut child =
+            Command::new("cat").stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("cat runs");
+        let watch =
+            ProcessWatch::new(ProcessIdentity::of(child.id()).expect("/proc is there").expect("it runs"));
+        watch.kill();
+        assert!(!child.wait().expect("it can be collected").success());
+        assert!(watch.has_exited());
+        watch.kill();
     }
 
     #[test]

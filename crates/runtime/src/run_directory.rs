@@ -75,6 +75,28 @@ impl RunDirectory {
         unreachable!("a directory can't hold all numbers")
     }
 
+    /// Takes over a run that has lost its supervisor.
+    ///
+    /// # Errors
+    /// There is no such run, or its supervisor lives.
+    pub fn adopt(path: &Path) -> Result<Self, RunDirectoryError> {
+        let error = |source| RunDirectoryError { path: path.to_path_buf(), source };
+        let path = path.canonicalize().map_err(error)?;
+        let base = path.parent().unwrap_or(&path);
+        // While it is held nobody takes the run for dead and removes it.
+        let (_, _base_lock) = enter(base)?;
+        if !path.join(LOCK).is_file() {
+            return Err(error(io::ErrorKind::NotFound.into()));
+        }
+        let lock = lock(&path, FlockOperation::NonBlockingLockExclusive).map_err(|locking| {
+            match locking.source.kind() == io::ErrorKind::WouldBlock {
+                true => error(io::Error::new(io::ErrorKind::AddrInUse, "its supervisor lives")),
+                false => locking,
+            }
+        })?;
+        Ok(Self { path, is_removed: false, _lock: lock })
+    }
+
     /// The directory.
     pub fn path(&self) -> &Path {
         &self.path
@@ -123,6 +145,11 @@ impl RunDirectory {
     /// A file can't be removed.
     pub fn remove(mut self) -> Result<(), RunDirectoryError> {
         self.remove_all()
+    }
+
+    /// Lets go of it, and removes nothing: the run may be adopted.
+    pub fn leave_as_it_is(mut self) {
+        self.is_removed = true;
     }
 
     fn remove_all(&mut self) -> Result<(), RunDirectoryError> {
@@ -286,6 +313,24 @@ mod tests {
         let member = Member::join(&orphaned, role, WaitPolicy::default(), Entry::Vacant).expect("a place");
         assert_eq!(RunDirectory::clean_dead(base.path()).expect("nothing fails"), Vec::<PathBuf>::new());
         drop(member);
+    }
+
+    #[test]
+    fn a_run_is_adopted_once_its_supervisor_is_gone_and_by_one_only() {
+        let base = base();
+        let run = RunDirectory::create(base.path()).expect("a run");
+        let path = run.path().to_owned();
+        let error = RunDirectory::adopt(&path).expect_err("it has a supervisor");
+        assert!(error.to_string().contains("its supervisor lives"), "{error}");
+
+        let orphaned = base.path().canonicalize().expect("a path").join("1-0");
+        std::fs::create_dir(&orphaned).expect("it can be made");
+        assert!(RunDirectory::adopt(&orphaned).is_err(), "it is no run");
+        std::fs::write(orphaned.join(LOCK), "").expect("it can be made");
+        let adopted = RunDirectory::adopt(&orphaned).expect("nobody has it");
+        RunDirectory::adopt(&orphaned).expect_err("it has been adopted");
+        drop(adopted);
+        assert!(!orphaned.exists(), "it ended with its second supervisor");
     }
 
     #[test]

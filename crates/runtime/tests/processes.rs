@@ -11,7 +11,8 @@ use mikoshi_runtime::{
     OBSERVER_DEPTH, Observer, Participant, Placement, ProcessIdentity, Replaceable, Role, RunDirectory,
     State, TAP_LEAD_TICKS, Tap, TickError, TickSchedule, WaitPolicy, run_in_one_thread, run_service,
 };
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
 use std::ops::ControlFlow;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::ExitStatusExt;
@@ -123,6 +124,7 @@ impl<P: Replaceable> Replaceable for Faulty<P> {
 fn a_process_of_a_run() {
     let variable = |name: &str| std::env::var(format!("MIKOSHI_TEST_{name}")).ok();
     let Some(role) = variable("ROLE") else { return };
+    std::thread::spawn(end_with_parent);
     let run = PathBuf::from(variable("RUN").expect("a run"));
     let number = |name: &str| variable(name).map_or(ENDLESS, |value| value.parse().expect("a number"));
     let result = match role.as_str() {
@@ -152,6 +154,14 @@ fn a_process_of_a_run() {
         }
     };
     std::process::exit(result.err().map_or(0, |error| exit_code(error.code())));
+}
+
+/// Whatever becomes of the tests, their processes end with them.
+fn end_with_parent() {
+    let parent = rustix::process::getppid().expect("who started this");
+    let parent = pidfd_open(parent, PidfdFlags::empty()).expect("it lives");
+    let _ = poll(&mut [PollFd::new(&parent, PollFlags::IN)], None);
+    std::process::exit(1);
 }
 
 fn serve(run: &Path, id: ServiceId, number: impl Fn(&str) -> u64) -> Result<(), TickError> {
@@ -187,7 +197,7 @@ fn exit_code(fault: FaultCode) -> i32 {
 struct Running {
     children: Children,
     board: Board,
-    /// This process, unless another is to be: what it starts ends with it.
+    /// This process, unless another is to be.
     supervisor: Option<Member>,
     directory: RunDirectory,
     base: tempfile::TempDir,
@@ -266,6 +276,12 @@ impl Running {
                 "{:#?}",
                 self.board.statuses()
             );
+            std::thread::yield_now();
+        }
+    }
+
+    fn wait_for_supervisor(&self) {
+        while self.board.states().any(|entry| entry == (Role::Supervisor, State::Absent)) {
             std::thread::yield_now();
         }
     }
@@ -383,11 +399,46 @@ fn a_request_to_stop_ends_a_run_in_which_a_process_is_frozen() {
 }
 
 #[test]
-fn a_run_ends_when_its_supervisor_dies() {
-    let mut running = Running::start(ENDLESS, &["supervisor"]);
+fn a_run_goes_on_when_its_supervisor_dies() {
+    let ticks = 20_000;
+    let mut running = Running::start(ticks, &["supervisor"]);
+    running.board.set_succession(true);
     running.wait_for_tick(10);
-    while running.board.states().any(|entry| entry == (Role::Supervisor, State::Absent)) {
-        std::thread::yield_now();
+    running.wait_for_supervisor();
+    assert!(running.board.is_supervised());
+    running.kill("supervisor");
+    assert!(!running.board.is_supervised());
+    for (role, code) in running.exit_codes() {
+        assert_eq!(code, 0, "service {role}");
+    }
+    assert_eq!(running.tick_of(ServiceId::Bridge), ticks - 1);
+    running.assert_leaves_nothing();
+}
+
+#[test]
+fn without_a_supervisor_who_replaces_it_a_process_that_dies_ends_the_run() {
+    let mut running = Running::start(ENDLESS, &["supervisor"]);
+    running.board.set_succession(true);
+    running.wait_for_tick(10);
+    running.wait_for_supervisor();
+    running.kill("supervisor");
+    running.kill(&Running::index_of(ServiceId::Servo(1)));
+    for (role, code) in running.exit_codes() {
+        assert_eq!(code, exit_code(FaultCode::PeerLost), "service {role}");
+    }
+    running.assert_leaves_nothing();
+}
+
+#[test]
+fn a_run_whose_supervisor_dies_before_all_have_come_does_not_wait_for_ever() {
+    let mut running = Running::prepare(false);
+    let path = running.directory.path().to_path_buf();
+    running.children.0.push(("supervisor".to_owned(), spawn("supervisor", &path, &[])));
+    running.wait_for_supervisor();
+    let coordinator = Running::index_of(ServiceId::Coordinator);
+    let all_but_one = schedule().services().into_iter().map(Running::index_of);
+    for role in all_but_one.filter(|role| *role != coordinator) {
+        running.children.0.push((role.clone(), spawn(&role, &path, &[("TICKS", ENDLESS)])));
     }
     running.kill("supervisor");
     for (role, code) in running.exit_codes() {

@@ -30,6 +30,22 @@ Exit status:
   3  a fault of the system: a process died or froze, no shared memory, no simulator
   130, 143  interrupted, terminated";
 
+const ADOPT_EXAMPLES: &str = "\
+Examples:
+  mikoshi adopt
+  mikoshi adopt 4711-0 --out runs/after-the-crash
+
+A run goes on if its supervisor is killed, but nobody records it, starts successors, or answers `mikoshi swap`.
+Who adopts it does all that from the next tick on. The results are those of the ticks that were seen. It can be
+stopped as any run: Ctrl-C ends its services in order.
+
+Exit status:
+  0  the rest of the run met its scenario's thresholds
+  1  it did not
+  2  there is no such run, or its supervisor lives
+  3  a fault of the system
+  130, 143  interrupted, terminated";
+
 const REPLAY_EXAMPLES: &str = "\
 Examples:
   mikoshi replay runs/hold-0/run.mcap
@@ -118,6 +134,9 @@ pub enum Command {
     /// Run a scenario: one process per service, or all of them in one thread
     #[command(after_help = RUN_EXAMPLES)]
     Run(RunArguments),
+    /// Look after a run whose supervisor was killed: its services went on without
+    #[command(after_help = ADOPT_EXAMPLES)]
+    Adopt(AdoptArguments),
     /// Execute the services of a recorded run anew, and compare what they say
     #[command(after_help = REPLAY_EXAMPLES)]
     Replay(ReplayArguments),
@@ -170,6 +189,14 @@ pub struct RunArguments {
     /// Pace ticks by the clock, and go on without what does not come in time
     #[arg(long, conflicts_with = "in_process")]
     pub real_time: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub results: ResultsArguments,
+}
+
+/// Where results go, and which.
+#[derive(Args, Debug)]
+pub struct ResultsArguments {
     /// Where the results go [default: a new folder runs/NAME-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -182,6 +209,16 @@ pub struct RunArguments {
     /// Record no frames: run.mcap takes 2.6 MB for each second of four robots
     #[arg(long)]
     pub no_log: bool,
+}
+
+/// `mikoshi adopt`.
+#[derive(Args, Debug)]
+pub struct AdoptArguments {
+    /// The run, as `mikoshi status` names it [default: the only one without a supervisor]
+    pub run: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub results: ResultsArguments,
 }
 
 /// `mikoshi replay`.

@@ -1,17 +1,21 @@
-//! The service processes of a run: started, watched, ended, and never left behind.
+//! The service processes of a run: started or adopted, replaced, ended.
 
 use crate::binaries;
 use crate::failure::Failure;
+use crate::orphans::{Orphan, orphans_of};
+use crate::service_process::{Handle, ServiceProcess, Variant};
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::{Board, ProcessIdentity, ProcessWatch};
 use rustix::process::{Pid, Signal, getpid, getppid, set_parent_process_death_signal};
 use std::ffi::OsStr;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::rc::Rc;
 
 /// How long processes get to end by themselves.
 const GRACE: Duration = Duration::from_secs(2);
@@ -19,43 +23,6 @@ const GRACE: Duration = Duration::from_secs(2);
 const LOOK: Duration = Duration::from_millis(2);
 /// How long a process that was taken over from may live on: it may wake up, and end by itself.
 const FENCED_GRACE: Duration = Duration::from_secs(1);
-/// Last words of a process that are shown when it failed.
-const LAST_LINES: usize = 12;
-
-/// One service process.
-pub struct ServiceProcess {
-    /// Which service.
-    pub service: ServiceId,
-    /// What people call it: `bridge`, `servo of robot A`.
-    pub label: String,
-    /// The robot that it controls.
-    robot: Option<String>,
-    /// What its successors take over, too.
-    variant: Variant,
-    /// How it ended, once it has.
-    pub ended: Option<Ended>,
-    child: Child,
-    log: PathBuf,
-}
-
-/// In what a process differs from the others of its kind.
-#[derive(Clone, Debug, Default)]
-pub struct Variant {
-    /// Its description of the run.
-    pub spec: Option<PathBuf>,
-    /// Its program.
-    pub program: Option<PathBuf>,
-}
-
-/// How a process ended.
-#[derive(Clone, Copy, Debug)]
-pub struct Ended {
-    /// By itself or by a signal.
-    pub status: ExitStatus,
-    /// Whether the signal was ours, since it would not end.
-    pub by_us: bool,
-}
-
 /// The service processes of a run. Dropping them ends them.
 pub struct Children {
     run_directory: PathBuf,
@@ -85,6 +52,62 @@ impl Children {
         let process = self.start(service, label, robot, Variant::default(), &[])?;
         self.processes.push(process);
         Ok(())
+    }
+
+    /// Takes over the services of a run that has lost its supervisor, each of which people call by its label, and
+    /// whatever stands by; who was on the way to be swapped in is not awaited any more.
+    ///
+    /// # Errors
+    /// A service is nobody's, or `/proc` is not to be read.
+    pub fn adopt<'a>(
+        run_directory: &Path,
+        logs: &Path,
+        services: impl Iterator<Item = (ServiceId, String, Option<&'a str>)>,
+    ) -> Result<Self, Failure> {
+        let mut children = Self::of(run_directory, logs);
+        let board = Rc::new(Board::open(run_directory).map_err(Failure::fault)?);
+        let services: Vec<_> = services.collect();
+        // Before anything happens to anybody.
+        if let Some((_, label, _)) =
+            services.iter().find(|(service, ..)| board.process_of(*service).is_none())
+        {
+            return Err(Failure::fault(format!("the run has no {label}: it had not begun")));
+        }
+        let mut orphans = orphans_of(run_directory).map_err(Failure::fault)?;
+        for (service, label, robot) in services {
+            let Some(in_charge) = board.process_of(service) else { continue };
+            let is_of_service = |orphan: &mut Orphan| match robot {
+                Some(robot) => orphan.robot.as_deref() == Some(robot),
+                None => orphan.pid == in_charge.pid || orphan.is_program(binaries::name_of(service)),
+            };
+            let mut found: Vec<_> = orphans.extract_if(.., is_of_service).collect();
+            let known = found.iter().position(|orphan| orphan.pid == in_charge.pid);
+            let known = known.map(|index| found.swap_remove(index));
+            let default_log = children.log_of(service, robot);
+            let adopted = |identity, orphan: Option<Orphan>| {
+                let (variant, log) = orphan.map(|orphan| (orphan.variant, orphan.log)).unwrap_or_default();
+                ServiceProcess {
+                    service,
+                    label: label.clone(),
+                    robot: robot.map(str::to_owned),
+                    variant,
+                    ended: None,
+                    handle: Handle::Adopted { watch: ProcessWatch::new(identity), board: Rc::clone(&board) },
+                    log: log.unwrap_or_else(|| default_log.clone()),
+                }
+            };
+            children.processes.push(adopted(in_charge, known));
+            for orphan in found {
+                let Ok(Some(identity)) = ProcessIdentity::of(orphan.pid) else { continue };
+                let is_standby = orphan.is_standby;
+                let mut process = adopted(identity, Some(orphan));
+                match is_standby {
+                    true => children.standbys.push(process),
+                    false => process.kill(),
+                }
+            }
+        }
+        Ok(children)
     }
 
     /// Starts the successor of a process that has ended.
@@ -147,21 +170,18 @@ impl Children {
         in_charge: impl Fn(ServiceId) -> Option<u32>,
     ) -> Vec<(ServiceId, String)> {
         let mut promotions = Vec::new();
-        let is_promoted =
-            |standby: &mut ServiceProcess| in_charge(standby.service) == Some(standby.child.id());
+        let is_promoted = |standby: &mut ServiceProcess| in_charge(standby.service) == Some(standby.id());
         for standby in self.standbys.extract_if(.., is_promoted) {
             let service = standby.service;
             let process = self.processes.iter_mut().find(|process| process.service == service);
             let Some(process) = process else { continue };
             let mut predecessor = core::mem::replace(process, standby);
-            let cause = match predecessor.look().map(|ended| ended.status) {
-                Some(status) => match status.signal() {
-                    Some(signal) => format!("killed by signal {signal}"),
-                    // Who was fenced ends well.
-                    None if status.success() => "fell behind".to_owned(),
-                    None => "failed".to_owned(),
-                },
-                None => "fell behind".to_owned(),
+            predecessor.look();
+            // Who was fenced ends well.
+            let cause = match (predecessor.death(), predecessor.has_failed()) {
+                (Some(death), _) => death,
+                (None, true) => "failed".to_owned(),
+                (None, false) => "fell behind".to_owned(),
             };
             // Of those before it nobody expects anything any more, and their places are needed.
             for (other, _) in self.fenced.iter_mut().filter(|(other, _)| other.service == service) {
@@ -234,11 +254,7 @@ impl Children {
             Some(program) => program.clone(),
             None => binaries::find(binaries::name_of(service))?,
         };
-        let file_name = match &robot {
-            Some(robot) => format!("servo-{robot}.log"),
-            None => format!("{service}.log"),
-        };
-        let log = self.logs.join(file_name);
+        let log = self.log_of(service, robot.as_deref());
         let mut command = Command::new(&program);
         command.arg("--run").arg(&self.run_directory).args(arguments);
         if let Some(robot) = &robot {
@@ -250,9 +266,16 @@ impl Children {
         // After what its predecessors said.
         let log_file = OpenOptions::new().create(true).append(true).open(&log);
         let child = log_file
-            .and_then(|log_file| start_with(command, log_file))
+            .and_then(|log_file| spawn(command, log_file))
             .map_err(|error| Failure::fault(error).context(format_args!("{label}: {}", program.display())))?;
-        Ok(ServiceProcess { service, label, robot, variant, ended: None, child, log })
+        Ok(ServiceProcess { service, label, robot, variant, ended: None, handle: Handle::Own(child), log })
+    }
+
+    fn log_of(&self, service: ServiceId, robot: Option<&str>) -> PathBuf {
+        self.logs.join(match robot {
+            Some(robot) => format!("servo-{robot}.log"),
+            None => format!("{service}.log"),
+        })
     }
 
     /// All processes.
@@ -260,15 +283,12 @@ impl Children {
         &self.processes
     }
 
-    /// Looks which have ended; whether any of them ended otherwise than with success.
-    pub fn look(&mut self) -> bool {
+    /// Looks which have ended.
+    pub fn look(&mut self) {
         self.bury_fenced();
-        for candidate in &mut self.candidates {
-            candidate.look();
+        for process in self.processes.iter_mut().chain(&mut self.candidates) {
+            process.look();
         }
-        self.processes.iter_mut().fold(false, |has_failed, process| {
-            has_failed | process.look().is_some_and(|ended| !ended.status.success())
-        })
     }
 
     /// Kills these: they are frozen, and would not end by themselves.
@@ -313,64 +333,24 @@ impl Drop for Children {
     }
 }
 
-impl ServiceProcess {
-    /// How it ended, if it has.
-    pub fn look(&mut self) -> Option<Ended> {
-        if self.ended.is_none()
-            && let Ok(Some(status)) = self.child.try_wait()
-        {
-            self.ended = Some(Ended { status, by_us: false });
-        }
-        self.ended
-    }
-
-    /// Its process id.
-    pub fn id(&self) -> u32 {
-        self.child.id()
-    }
-
-    /// The signal that it died of.
-    pub fn signal(&self) -> Option<i32> {
-        self.ended.and_then(|ended| ended.status.signal())
-    }
-
-    fn kill(&mut self) {
-        if self.ended.is_none() {
-            // It fails for a process that has just ended, which is what we want.
-            let _ = self.child.kill();
-            self.ended = self.child.wait().ok().map(|status| Ended { status, by_us: true });
-        }
-    }
-
-    /// The last lines that it wrote, indented; empty if it said nothing.
-    pub fn last_words(&self) -> String {
-        let text = fs::read(&self.log).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-        let text = text.unwrap_or_default();
-        let lines: Vec<_> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-        let last = &lines[lines.len().saturating_sub(LAST_LINES)..];
-        last.iter().flat_map(|line| ["\n  ", line]).collect()
-    }
-}
-
-/// Starts a process whose every word goes to a new file, and which dies with the thread that calls this.
-pub(crate) fn start(command: Command, log: &Path) -> io::Result<Child> {
-    start_with(command, File::create(log)?)
-}
-
-fn start_with(mut command: Command, log: File) -> io::Result<Child> {
-    command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
-    // A Ctrl-C at the terminal is for the supervisor, who ends all in order.
-    command.process_group(0);
+/// Starts a run whose every word goes to a new file, and which ends in order with the thread that calls this.
+pub(crate) fn start_run(mut command: Command, log: &Path) -> io::Result<Child> {
     let parent = getpid();
     // SAFETY: between fork and exec the closure only makes two system calls on plain values: it neither
     // allocates nor takes a lock.
-    unsafe { command.pre_exec(move || die_with(parent)) };
-    command.spawn()
+    unsafe { command.pre_exec(move || end_with(parent)) };
+    spawn(command, File::create(log)?)
 }
 
-/// Services notice on the board that their supervisor is gone. This is for those that no longer look.
-fn die_with(parent: Pid) -> io::Result<()> {
-    set_parent_process_death_signal(Some(Signal::KILL))?;
+/// A process of its own: it lives on without us.
+fn spawn(mut command: Command, log: File) -> io::Result<Child> {
+    command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
+    // A Ctrl-C at the terminal is for the supervisor, who ends all in order.
+    command.process_group(0).spawn()
+}
+
+fn end_with(parent: Pid) -> io::Result<()> {
+    set_parent_process_death_signal(Some(Signal::TERM))?;
     // It may have died before.
     match getppid() == Some(parent) {
         true => Ok(()),

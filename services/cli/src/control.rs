@@ -4,7 +4,7 @@
 use crate::failure::{Failure, Status};
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
-use mikoshi_runtime::RunDirectory;
+use mikoshi_runtime::{Board, RunDirectory};
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -73,7 +73,10 @@ impl Control {
     /// # Errors
     /// There can be no socket.
     pub fn listen(run: &Path) -> io::Result<Self> {
-        let listener = UnixListener::bind(run.join(SOCKET))?;
+        let socket = run.join(SOCKET);
+        // That of a supervisor that was killed; nobody else has the run.
+        let _ = std::fs::remove_file(&socket);
+        let listener = UnixListener::bind(socket)?;
         listener.set_nonblocking(true)?;
         Ok(Self { listener, clients: Vec::new() })
     }
@@ -154,17 +157,29 @@ impl Client {
 /// # Errors
 /// There is none, or more than one: bad usage.
 pub fn find_run(name: Option<&str>) -> Result<PathBuf, Failure> {
+    find_run_that(name, "runs", |_| true)
+}
+
+/// The same among those of which this is true.
+///
+/// # Errors
+/// As [`find_run`].
+pub fn find_run_that(
+    name: Option<&str>,
+    what_it_does: &str,
+    is_meant: impl Fn(&Board) -> bool,
+) -> Result<PathBuf, Failure> {
     let mut runs = RunDirectory::list(&RunDirectory::default_base()).map_err(Failure::fault)?;
-    runs.retain(|run| run.alive);
+    runs.retain(|run| run.alive && Board::open(&run.path).is_ok_and(|board| is_meant(&board)));
     let name_of = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let names: Vec<_> = runs.iter().map(|run| name_of(&run.path)).collect();
     let usage = |message: String| Failure { status: Status::Usage, message };
     let index = match name {
         Some(name) => names.iter().position(|other| other == name).ok_or_else(|| {
-            usage(format!("--run: found {name:?}, expected one of those that run: {}", names.join(", ")))
+            usage(format!("--run: found {name:?}, expected what {what_it_does}: {}", names.join(", ")))
         })?,
         None if runs.len() == 1 => 0,
-        None if runs.is_empty() => return Err(usage("nothing runs".to_owned())),
+        None if runs.is_empty() => return Err(usage(format!("nothing {what_it_does}"))),
         None => return Err(usage(format!("several runs: choose one by --run: {}", names.join(", ")))),
     };
     Ok(runs.swap_remove(index).path)

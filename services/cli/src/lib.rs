@@ -18,6 +18,7 @@ pub mod interrupts;
 mod judge;
 mod observed_run;
 pub mod observer;
+mod orphans;
 pub mod outcome;
 pub mod output_directory;
 pub mod prepare;
@@ -28,6 +29,7 @@ pub mod replay;
 mod report;
 mod requests;
 mod revise;
+mod service_process;
 mod soak;
 mod stamps;
 mod standstill;
@@ -51,6 +53,7 @@ pub fn main_of_command() -> ExitCode {
     conclude(match &Arguments::parse().command {
         Command::Run(arguments) if arguments.in_process => become_in_process(),
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
+        Command::Adopt(arguments) => commands::adopt::adopt(arguments),
         Command::Replay(_) => become_in_process(),
         Command::Swap(arguments) => commands::swap::swap(arguments).map(|()| Status::Met),
         Command::Stop(arguments) => commands::operator::stop(arguments).map(|()| Status::Met),

@@ -1,6 +1,6 @@
 //! Watches a run tick by tick, and says at the end what it came to.
 
-use crate::arguments::RunArguments;
+use crate::arguments::ResultsArguments;
 use crate::failure::{Failure, as_lines};
 use crate::judge;
 use crate::observed_run::observed_run;
@@ -27,6 +27,7 @@ pub struct RunObserver {
     frames_lost: u64,
     swaps: Vec<(ServiceId, Swap)>,
     stops: Stops,
+    first_tick: Option<u64>,
     ticks: u64,
     clock: Stopwatch,
 }
@@ -38,7 +39,7 @@ impl RunObserver {
     /// The log can't be written: [`Status::Fault`](crate::failure::Status::Fault).
     pub fn new(
         prepared: &Prepared,
-        arguments: &RunArguments,
+        arguments: &ResultsArguments,
         out: &OutputDirectory,
     ) -> Result<Self, Failure> {
         let run = &prepared.run;
@@ -53,6 +54,7 @@ impl RunObserver {
             frames_lost: 0,
             swaps: vec![],
             stops: Stops::of(run),
+            first_tick: None,
             ticks: 0,
             clock: Stopwatch::start(),
         })
@@ -71,6 +73,7 @@ impl RunObserver {
         }
         self.stops.observe(observation.tick(), &observation.team_state.payload);
         self.freshness.observe(observation);
+        self.first_tick.get_or_insert(observation.tick());
         self.ticks = observation.tick() + 1;
         self.progress.set_ticks(self.ticks);
         Ok(())
@@ -115,7 +118,8 @@ impl RunObserver {
             log.finish().map_err(Failure::fault)?;
         }
         let (figures, scenario) = (self.figures.finish(), &run.scenario);
-        let sim_time_s = self.ticks as f64 * scenario.control_period_s;
+        let first_tick = self.first_tick.unwrap_or_default();
+        let sim_time_s = (self.ticks - first_tick) as f64 * scenario.control_period_s;
         let freshness = &self.freshness;
         let count_lost = |(service, swap): (ServiceId, Swap)| {
             let ticks_lost = freshness.ticks_lost(service, swap.tick);
@@ -125,6 +129,7 @@ impl RunObserver {
             scenario: scenario.name.clone(),
             seed: scenario.seed,
             ticks: self.ticks,
+            first_tick,
             control_period_s: scenario.control_period_s,
             sim_time_s,
             wall_time_s,

@@ -45,6 +45,17 @@ pub fn prepare_with(
     Ok(Prepared { run, arms, law, schedule })
 }
 
+/// The same of a run that is known already.
+///
+/// # Errors
+/// It is of another build: [`Status::Usage`](crate::failure::Status::Usage).
+pub fn prepare_resolved(run: RunSpec) -> Result<Prepared, Failure> {
+    let arms = team_arms(&run).map_err(Failure::usage)?;
+    let law = build_hybrid_law(&run).map_err(Failure::usage)?;
+    let schedule = tick_schedule(&run).map_err(Failure::usage)?;
+    Ok(Prepared { run, arms, law, schedule })
+}
+
 /// Says where what the law objects to was written.
 fn place(loaded: &LoadedScenario, error: BuildCoordinatorError) -> Failure {
     match &error {

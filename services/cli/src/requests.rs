@@ -8,9 +8,8 @@ use crate::outcome::{label_of, service_named, swap_of};
 use crate::revise::revise;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, operator};
-use mikoshi_resolution::write_spec;
+use mikoshi_resolution::{read_spec, write_spec};
 use mikoshi_runtime::Board;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Those of a run, and what has become of them so far.
@@ -18,10 +17,6 @@ pub struct Requests {
     control: Control,
     run_directory: PathBuf,
     pending: Vec<Pending>,
-    /// Of services whose process has other settings than the run began with.
-    revised: BTreeMap<ServiceId, RunSpec>,
-    /// Descriptions written so far.
-    specs: usize,
 }
 
 /// A successor on its way.
@@ -41,13 +36,7 @@ impl Requests {
     /// Nobody could ask.
     pub fn listen(run_directory: &Path) -> std::io::Result<Self> {
         let control = Control::listen(run_directory)?;
-        Ok(Self {
-            control,
-            run_directory: run_directory.to_owned(),
-            pending: Vec::new(),
-            revised: BTreeMap::new(),
-            specs: 0,
-        })
+        Ok(Self { control, run_directory: run_directory.to_owned(), pending: Vec::new() })
     }
 
     /// Whether a successor of this service is on its way.
@@ -95,7 +84,6 @@ impl Requests {
                     client.done(format!("{} replaced in tick {}", label_of(run, service), swap.tick));
                     if let Some(revised) = revised {
                         observer.note_revision(&swap, service, &revised);
-                        self.revised.insert(service, revised);
                     }
                     observer.note_swap(service, swap);
                 }
@@ -110,6 +98,12 @@ impl Requests {
                 None => index += 1,
             }
         }
+    }
+
+    /// A name for a description of the run that none has yet.
+    fn free_spec(&self) -> PathBuf {
+        let named = |number| self.run_directory.join(format!("run-{number}.bin"));
+        (1_u32..).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(0))
     }
 
     fn begin(
@@ -132,10 +126,11 @@ impl Requests {
         let revised = match set {
             [] => None,
             set => {
-                let current = self.revised.get(&service).unwrap_or(run);
-                let revised = revise(current, set).map_err(|failure| failure.message)?;
-                self.specs += 1;
-                let path = self.run_directory.join(format!("run-{}.bin", self.specs));
+                let current = variant.spec.as_deref().map(read_spec).transpose();
+                let current = current.map_err(|error| error.to_string())?;
+                let revised =
+                    revise(current.as_ref().unwrap_or(run), set).map_err(|failure| failure.message)?;
+                let path = self.free_spec();
                 write_spec(&path, &revised).map_err(|error| error.to_string())?;
                 variant.spec = Some(path);
                 Some(revised)

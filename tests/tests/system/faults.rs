@@ -153,15 +153,22 @@ fn an_interrupt_ends_all_and_keeps_what_was_recorded() {
 }
 
 #[test]
-fn services_end_with_a_supervisor_that_is_killed_and_the_next_run_cleans_up() {
+fn services_go_on_without_a_supervisor_that_is_killed_and_the_next_run_cleans_up() {
     let results = Results::new();
-    let running = start(&results);
+    let running = Running::start(
+        &of_project("hold"),
+        &["--set", "duration_s=5", "--set", "hybrid.start_s=1"],
+        &results,
+    );
     let (directory, services) = (running.directory(), running.services());
     running.signal(Signal::KILL);
     assert_eq!(running.wait().status, None);
+    let board = Board::open(&directory).expect("a board");
     while services.iter().any(|(_, pid)| is_alive(*pid)) {
         yield_now();
     }
+    let ends = services.iter().map(|(service, _)| board.last_position(*service).expect("a service").tick);
+    assert!(ends.into_iter().all(|tick| tick == 999), "{:#?}", board.statuses());
     let said = run(&of_project("hold"), &SHORT, &Results::new());
     assert_eq!(said.status, Some(1), "{said:#?}");
     assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());

@@ -1,5 +1,6 @@
 //! Tests of the command as a user meets it.
 
+mod adoption;
 mod bad_input;
 mod command;
 mod determinism;

@@ -126,7 +126,7 @@ impl Process {
         let domain = Domain::of(run);
         let mut config = domain.config()?;
         // A successor makes room for its ports.
-        config.global.node.cleanup_dead_nodes_on_creation = member.is_successor();
+        config.global.node.cleanup_dead_nodes_on_creation = member.is_successor() || member.epoch() > 1;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -523,6 +523,8 @@ impl IceoryxTap {
     /// # Errors
     /// The domain or iceoryx2 can't be used.
     pub fn open(run: &Path, member: Member, schedule: &TickSchedule) -> Result<Self, OpenError> {
+        // If the run has begun without it, it waits at its next tick.
+        member.slot().set_position(Position::default());
         let process = Process::open(run, member, schedule)?;
         let opener =
             schedule.phases().first().and_then(|phase| process.slot_of(Role::Service(phase.service)));
@@ -539,6 +541,18 @@ impl IceoryxTap {
         // No tick begins before the tap is ready, and it can begin whenever the services do.
         self.process.member.enter(State::Running);
         Ok(())
+    }
+
+    /// The first tick of which it misses nothing: the first of all, or for a tap that comes later one that begins
+    /// once all services are connected to it; none before they are.
+    pub fn first_tick(&self) -> Option<u64> {
+        let member = &self.process.member;
+        if member.epoch() == 1 {
+            return Some(0);
+        }
+        let opener = member.board().slots().get(self.opener?)?;
+        // In this order: what begins after they were connected is complete.
+        member.is_welcome().then(|| opener.position().tick + 1)
     }
 
     /// Says that every frame of this many ticks has been consumed: the run stays within

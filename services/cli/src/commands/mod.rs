@@ -1,5 +1,6 @@
 //! One module per command.
 
+pub mod adopt;
 pub mod doctor;
 pub mod operator;
 pub mod plan;

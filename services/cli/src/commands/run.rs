@@ -1,6 +1,6 @@
 //! `mikoshi run`: a scenario from its file to its summary.
 
-use crate::arguments::RunArguments;
+use crate::arguments::{ResultsArguments, RunArguments};
 use crate::failure::{Failure, Status, as_lines};
 use crate::gain::GainReport;
 use crate::observer::RunObserver;
@@ -28,14 +28,24 @@ pub fn run(
     if let Some(warning) = scenario.is_controlled().then(|| GainReport::of(&prepared).warning()).flatten() {
         print_error(&as_lines("warning", &warning));
     }
+    carry_out(&prepared, &arguments.results, execute)
+}
+
+/// Has a run carried out by `execute`, judges it, and leaves its results.
+pub(super) fn carry_out(
+    prepared: &Prepared,
+    arguments: &ResultsArguments,
+    execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
+) -> Result<Status, Failure> {
+    let scenario = &prepared.run.scenario;
     let out = match &arguments.out {
         Some(path) => OutputDirectory::open(path, arguments.force)?,
         None => OutputDirectory::fresh(&scenario.name, scenario.seed)?,
     };
     save_scenario(&prepared.run, &out.scenario()).map_err(Failure::fault)?;
 
-    let mut observer = RunObserver::new(&prepared, arguments, &out)?;
-    let outcome = match execute(&prepared, &out, &mut observer) {
+    let mut observer = RunObserver::new(prepared, arguments, &out)?;
+    let outcome = match execute(prepared, &out, &mut observer) {
         Ok(outcome) => outcome,
         Err(failure) => {
             // There are no results: the folder is as good as new.

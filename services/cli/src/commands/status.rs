@@ -37,6 +37,8 @@ struct RunStatus {
     ticks: Option<u64>,
     /// Whether any of its processes lives; otherwise it is left over.
     alive: bool,
+    /// Whether its supervisor lives; otherwise it can be adopted.
+    supervised: bool,
     processes: Vec<ProcessStatus>,
 }
 
@@ -62,13 +64,16 @@ impl RunStatus {
     fn of(found: &FoundRun) -> Self {
         // A run that is just being made, or just being removed, has less to tell.
         let run = read_run(&found.path).ok();
-        let board = Board::open(&found.path).map(|board| board.statuses()).unwrap_or_default();
+        let board = Board::open(&found.path).ok();
+        let supervised = board.as_ref().is_some_and(Board::is_supervised);
+        let board = board.map(|board| board.statuses()).unwrap_or_default();
         Self {
             run: found.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             scenario: run.as_ref().map(|run| run.scenario.name.clone()),
             seed: run.as_ref().map(|run| run.scenario.seed),
             ticks: run.as_ref().map(|run| run.ticks),
             alive: found.alive,
+            supervised,
             processes: board
                 .iter()
                 .filter(|slot| slot.state != State::Absent)
@@ -82,7 +87,11 @@ impl RunStatus {
             (Some(scenario), Some(seed), Some(ticks)) => format!(": {scenario}, seed {seed}, {ticks} ticks"),
             _ => String::new(),
         };
-        let left_over = if self.alive { "" } else { " (left over: `mikoshi doctor --clean` removes it)" };
+        let hint = match (self.alive, self.supervised) {
+            (true, true) => "",
+            (true, false) => " (without a supervisor: `mikoshi adopt` looks after it)",
+            (false, _) => " (left over: `mikoshi doctor --clean` removes it)",
+        };
         let cells = |process: &ProcessStatus| {
             let dash = || "-".to_owned();
             let state = match (&process.fault, process.alive) {
@@ -101,7 +110,7 @@ impl RunStatus {
         };
         let titles = ["service", "robot", "pid", "epoch", "tick", "state"];
         let processes = table::of_text(&titles, self.processes.iter().map(cells));
-        format!("run {}{of_scenario}{left_over}\n{processes}", self.run)
+        format!("run {}{of_scenario}{hint}\n{processes}", self.run)
     }
 }
 

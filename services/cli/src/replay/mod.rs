@@ -58,6 +58,14 @@ pub fn replay(
         services.iter().map(|&service| Verdict { service, first: None, ticks: 0 }).collect();
     let mut ahead = Observation::for_team(run.robots.len());
     let mut is_ahead = log.read_tick(&mut ahead).map_err(Failure::usage)?;
+    if is_ahead && ahead.tick() > 0 {
+        let first = ahead.tick();
+        let message = format!(
+            "{} begins in tick {first}: a service is replayed from its first",
+            arguments.log.display()
+        );
+        return Err(Failure::usage(message));
+    }
     let mut ticks = 0;
     while is_ahead && arguments.until.is_none_or(|until| ticks < until) {
         let observation = ahead.clone();

@@ -40,9 +40,7 @@ impl Memory {
             }
         }
         let slopes = longest.into_iter().filter(|(_, samples)| samples.len() >= LEAST_SAMPLES);
-        slopes
-            .map(|(role, samples)| (role, samples[samples.len() - 1].kib, 60.0 * slope(samples)))
-            .collect()
+        slopes.map(|(role, samples)| (role, samples[samples.len() - 1].kib, 60.0 * slope(samples))).collect()
     }
 }
 

@@ -137,7 +137,7 @@ impl Attempt {
         for (key, value) in &arguments.scenario.overrides {
             command.arg("--set").arg(format!("{key}={value}"));
         }
-        let child = children::start(command, &out.with_extension("log"))
+        let child = children::start_run(command, &out.with_extension("log"))
             .map_err(|error| Failure::fault(error).context(program.display()))?;
         Ok(Self { child, out: out.to_owned() })
     }

@@ -77,7 +77,7 @@ impl<'a> Jobs<'a> {
 
     fn start(&mut self, folder: &'a RunFolder) -> Result<(), Failure> {
         folder.make_parent()?;
-        let child = children::start(folder.command(&self.program), &folder.errors())
+        let child = children::start_run(folder.command(&self.program), &folder.errors())
             .map_err(|error| Failure::fault(error).context(&folder.label))?;
         self.running.push(Job { folder, child });
         Ok(())
