@@ -4,6 +4,7 @@
 
 #![allow(non_snake_case)]
 
+mod bytes;
 mod canonical;
 mod course;
 mod figures;

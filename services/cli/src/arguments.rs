@@ -46,6 +46,21 @@ Exit status:
   3  a fault of the system
   130, 143  interrupted, terminated";
 
+const RECORD_EXAMPLES: &str = "\
+Examples:
+  mikoshi record --out part.mcap
+  mikoshi record 4711-0 --out part.mcap
+
+Every run records itself, unless it was told --no-log; this is for another file, or for a part. In lockstep
+nothing is lost: the run waits for the recorder, but not for one that is frozen. By the clock ticks that the
+recorder is too slow for are lost, and counted. Ctrl-C ends the recording, not the run.
+
+Exit status:
+  0  recorded to the end of the run, or up to Ctrl-C
+  1  the supervisor ended, or gave the recorder up: what was seen before is in the file
+  2  there is no such run
+  3  a fault of the system: the file can't be written";
+
 const REPLAY_EXAMPLES: &str = "\
 Examples:
   mikoshi replay runs/hold-0/run.mcap
@@ -137,6 +152,9 @@ pub enum Command {
     /// Look after a run whose supervisor was killed: its services went on without
     #[command(after_help = ADOPT_EXAMPLES)]
     Adopt(AdoptArguments),
+    /// Record the frames of a run that goes on, from now to its end
+    #[command(after_help = RECORD_EXAMPLES)]
+    Record(RecordArguments),
     /// Execute the services of a recorded run anew, and compare what they say
     #[command(after_help = REPLAY_EXAMPLES)]
     Replay(ReplayArguments),
@@ -219,6 +237,22 @@ pub struct AdoptArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub results: ResultsArguments,
+}
+
+/// `mikoshi record`.
+#[derive(Args, Debug)]
+pub struct RecordArguments {
+    /// The run, as `mikoshi status` names it [default: the only one]
+    pub run: Option<String>,
+    /// The log to be written
+    #[arg(long, value_name = "FILE.MCAP")]
+    pub out: PathBuf,
+    /// Replace it if it is there
+    #[arg(long)]
+    pub force: bool,
+    /// Errors and exit status only
+    #[arg(long, short)]
+    pub quiet: bool,
 }
 
 /// `mikoshi replay`.

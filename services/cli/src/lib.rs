@@ -12,6 +12,7 @@ mod children;
 pub mod commands;
 mod control;
 pub mod failure;
+mod feed;
 mod fraction;
 mod gain;
 pub mod interrupts;
@@ -54,6 +55,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Run(arguments) if arguments.in_process => become_in_process(),
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
         Command::Adopt(arguments) => commands::adopt::adopt(arguments),
+        Command::Record(arguments) => commands::record::record(arguments),
         Command::Replay(_) => become_in_process(),
         Command::Swap(arguments) => commands::swap::swap(arguments).map(|()| Status::Met),
         Command::Stop(arguments) => commands::operator::stop(arguments).map(|()| Status::Met),

@@ -2,6 +2,7 @@
 
 use crate::arguments::ResultsArguments;
 use crate::failure::{Failure, as_lines};
+use crate::feed::Feed;
 use crate::judge;
 use crate::observed_run::observed_run;
 use crate::output_directory::OutputDirectory;
@@ -15,12 +16,16 @@ use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
     Fault, Figures, Freshness, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
 };
+use std::path::Path;
 
 /// Observes a run: figures, hash, log, progress.
 pub struct RunObserver {
     figures: Figures,
     hash: LogHash,
     log: Option<LogWriter>,
+    /// Why and from which tick on there is no log.
+    log_failure: Option<String>,
+    feed: Option<Feed>,
     progress: Progress,
     stamps: Stamps,
     freshness: Freshness,
@@ -48,6 +53,8 @@ impl RunObserver {
             figures: Figures::new(observed_run(run, prepared.law.internal_forces())?),
             hash: LogHash::default(),
             log: log.transpose().map_err(Failure::fault)?,
+            log_failure: None,
+            feed: None,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, !arguments.quiet),
             stamps: Stamps::new(run.scenario.clock, run.scenario.control_period_s),
             freshness: Freshness::with_delay(run.scenario.coordination_delay_ticks),
@@ -60,23 +67,48 @@ impl RunObserver {
         })
     }
 
-    /// Takes in one tick.
+    /// Lets other processes see what is observed of the run in this directory.
     ///
     /// # Errors
-    /// The log can't be written.
-    pub fn observe(&mut self, observation: &Observation) -> Result<(), WriteLogError> {
+    /// There can be no socket.
+    pub fn open_feed(&mut self, run_directory: &Path, run: &RunSpec) -> std::io::Result<()> {
+        self.feed = Some(Feed::open(run_directory, run.robots.len())?);
+        Ok(())
+    }
+
+    /// Serves those that listen; `true` if a run that can wait should.
+    pub fn serve_listeners(&mut self) -> bool {
+        self.feed.as_mut().is_some_and(|feed| {
+            feed.look();
+            feed.is_behind()
+        })
+    }
+
+    /// Takes in one tick. That the log can't be written is no reason to stop anybody: it is told at the end.
+    pub fn observe(&mut self, observation: &Observation) {
         self.hash.observe(observation);
         self.figures.observe(observation);
         self.stamps.observe(observation.object_truth.envelope.stamp_ns);
-        if let Some(log) = &mut self.log {
-            log.write(observation)?;
+        let written = self.log.as_mut().map_or(Ok(()), |log| log.write(observation));
+        self.note_log(observation.tick(), written);
+        if let Some(feed) = &mut self.feed {
+            feed.tick(observation);
         }
         self.stops.observe(observation.tick(), &observation.team_state.payload);
         self.freshness.observe(observation);
         self.first_tick.get_or_insert(observation.tick());
         self.ticks = observation.tick() + 1;
         self.progress.set_ticks(self.ticks);
-        Ok(())
+    }
+
+    fn note_log(&mut self, tick: u64, written: Result<(), WriteLogError>) {
+        let Err(error) = written else { return };
+        self.log = None;
+        let message = format!("the log ends in tick {tick}: {error}");
+        print_error(&as_lines("warning", &message));
+        let service = "recorder".to_owned();
+        self.stops.faults.push(Fault { tick, service, robot: None, code: "log-lost".to_owned() });
+        self.log_failure = Some(message);
     }
 
     /// Takes note of a process that was replaced.
@@ -100,6 +132,9 @@ impl RunObserver {
         if let Some(log) = &mut self.log {
             let _ = log.write_revision(swap.tick, service, revised);
         }
+        if let Some(feed) = &mut self.feed {
+            feed.revision(swap.tick, service, revised);
+        }
     }
 
     /// Ticks that have gone by.
@@ -108,14 +143,13 @@ impl RunObserver {
     }
 
     /// Closes the log, and judges the run.
-    ///
-    /// # Errors
-    /// The log can't be written: [`Status::Fault`](crate::failure::Status::Fault).
-    pub fn finish(self, run: &RunSpec, faults: Vec<Fault>) -> Result<Summary, Failure> {
+    pub fn finish(mut self, run: &RunSpec, faults: Vec<Fault>) -> Summary {
         let wall_time_s = self.clock.elapsed().as_secs_f64();
         self.progress.clear();
-        if let Some(log) = self.log {
-            log.finish().map_err(Failure::fault)?;
+        let written = self.log.take().map_or(Ok(()), LogWriter::finish);
+        self.note_log(self.ticks, written);
+        if let Some(feed) = self.feed.take() {
+            feed.end();
         }
         let (figures, scenario) = (self.figures.finish(), &run.scenario);
         let first_tick = self.first_tick.unwrap_or_default();
@@ -160,8 +194,9 @@ impl RunObserver {
         } else {
             summary.failures = judge::failures(scenario, &summary);
         }
+        summary.failures.extend(self.log_failure);
         summary.passed = summary.failures.is_empty();
-        Ok(summary)
+        summary
     }
 }
 

@@ -9,6 +9,7 @@ mod faults;
 mod job;
 mod leader_follower;
 mod real_time;
+mod record;
 mod replay;
 mod report;
 mod succession;

@@ -57,7 +57,10 @@ fn execute(
     let mut early_end = None;
     let ended = run_in_one_thread(&prepared.schedule, &mut participants, run.ticks, |_| {
         let observed = match team_tap.try_take_tick(&mut observation) {
-            Ok(true) => observer.observe(&observation).map_err(Failure::fault),
+            Ok(true) => {
+                observer.observe(&observation);
+                Ok(())
+            }
             Ok(false) => Err(Failure::fault("a tick without all of its frames")),
             Err(error) => Err(Failure::fault(error)),
         };

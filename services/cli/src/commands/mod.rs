@@ -4,6 +4,7 @@ pub mod adopt;
 pub mod doctor;
 pub mod operator;
 pub mod plan;
+pub mod record;
 pub mod report;
 pub mod run;
 pub mod status;

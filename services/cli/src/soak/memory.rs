@@ -3,7 +3,7 @@
 use mikoshi_runtime::Role;
 use std::collections::BTreeMap;
 
-/// Memory of every process of a run, sampled.
+/// Memory that every process of a run has of its own, sampled.
 #[derive(Debug, Default)]
 pub struct Memory {
     samples: BTreeMap<(Role, u32), Vec<Sample>>,
@@ -23,7 +23,7 @@ const LEAST_SAMPLES: usize = 10;
 impl Memory {
     /// Takes note of what the process in this role occupies now.
     pub fn sample(&mut self, role: Role, pid: u32, seconds: f64) {
-        if let Some(kib) = resident_kib(pid) {
+        if let Some(kib) = own_kib(pid) {
             self.samples.entry((role, pid)).or_default().push(Sample { seconds, kib });
         }
     }
@@ -54,11 +54,15 @@ fn slope(samples: &[Sample]) -> f64 {
     if variance > 0.0 { covariance / variance } else { 0.0 }
 }
 
-/// Field 2 of `/proc/PID/statm`, in pages of 4 KiB.
-fn resident_kib(pid: u32) -> Option<f64> {
-    let statm = std::fs::read_to_string(format!("/proc/{pid}/statm")).ok()?;
-    let pages: u64 = statm.split_ascii_whitespace().nth(1)?.parse().ok()?;
-    Some(4.0 * pages as f64)
+/// What a process has that no other has and no file: its heap and stacks, in memory or swapped out. Pages of
+/// programs and of shared memory come and go as the system likes.
+fn own_kib(pid: u32) -> Option<f64> {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let kib_of = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name));
+        line?.trim().strip_suffix(" kB")?.parse::<f64>().ok()
+    };
+    Some(kib_of("RssAnon:")? + kib_of("VmSwap:")?)
 }
 
 #[cfg(test)]
@@ -75,8 +79,8 @@ mod tests {
 
     #[test]
     fn this_process_occupies_something_and_one_that_is_gone_nothing() {
-        assert!(resident_kib(std::process::id()).is_some_and(|kib| kib > 100.0));
-        assert_eq!(resident_kib(u32::MAX), None);
+        assert!(own_kib(std::process::id()).is_some_and(|kib| kib > 100.0));
+        assert_eq!(own_kib(u32::MAX), None);
     }
 
     #[test]

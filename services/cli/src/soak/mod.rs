@@ -67,7 +67,8 @@ struct Kill {
 #[derive(Debug, Serialize)]
 struct MemoryRow {
     service: String,
-    resident_kib: f64,
+    /// In memory or swapped out, without shared memory and programs.
+    own_kib: f64,
     growth_kib_per_min: f64,
 }
 
@@ -285,12 +286,12 @@ fn judge(
     }
     let of_run = disturbed["failures"].as_array().into_iter().flatten().filter_map(Value::as_str);
     failures.extend(of_run.map(str::to_owned));
-    let memory = memory.slopes().into_iter().map(|(role, resident_kib, growth_kib_per_min)| MemoryRow {
+    let memory = memory.slopes().into_iter().map(|(role, own_kib, growth_kib_per_min)| MemoryRow {
         service: match role {
             Role::Service(service) => label_of(run, service),
             role => role.to_string(),
         },
-        resident_kib,
+        own_kib,
         growth_kib_per_min,
     });
     SoakResult {
@@ -322,10 +323,10 @@ impl SoakResult {
         );
         if !self.memory.is_empty() {
             let rows = self.memory.iter().map(|row| {
-                let megabytes = format!("{:.1}", row.resident_kib / 1024.0);
+                let megabytes = format!("{:.1}", row.own_kib / 1024.0);
                 vec![row.service.clone(), megabytes, format!("{:+.1}", row.growth_kib_per_min)]
             });
-            text += &table::of_text(&["service", "resident MiB", "growth KiB/min"], rows);
+            text += &table::of_text(&["service", "memory MiB", "growth KiB/min"], rows);
         }
         let _ = writeln!(text, "log hash {}", self.disturbed_hash);
         for failure in &self.failures {

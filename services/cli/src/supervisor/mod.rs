@@ -54,6 +54,7 @@ pub fn supervise(
     let _ = RunDirectory::clean_dead(&base);
     Domain::check_space(required_bytes(&prepared.schedule)).map_err(Failure::fault)?;
     let directory = RunDirectory::create(&base).map_err(Failure::fault)?;
+    observer.open_feed(directory.path(), &prepared.run).map_err(Failure::fault)?;
     let supervisor = Supervisor::start(prepared, directory.path(), &out.service_logs())?;
     Ok(supervisor.see_through(prepared, directory.path(), out, observer, &interrupts))
 }
@@ -70,7 +71,8 @@ pub fn adopt(
 ) -> Result<Outcome, Failure> {
     let interrupts = Interrupts::listen().map_err(Failure::fault)?;
     let directory = RunDirectory::adopt(run).map_err(Failure::fault)?;
-    match Supervisor::adopt(prepared, directory.path(), &out.service_logs()) {
+    let opened = observer.open_feed(directory.path(), &prepared.run).map_err(Failure::fault);
+    match opened.and_then(|()| Supervisor::adopt(prepared, directory.path(), &out.service_logs())) {
         Ok(supervisor) => Ok(supervisor.see_through(prepared, directory.path(), out, observer, &interrupts)),
         Err(failure) => {
             directory.leave_as_it_is();
@@ -188,15 +190,14 @@ impl Supervisor {
                     has_begun = true;
                 }
             } else if is_started {
-                loop {
+                // In lockstep what is not taken keeps the run waiting.
+                while !observer.serve_listeners() || is_paced(prepared) {
                     match self.team_tap.try_take_tick(&mut observation) {
                         Ok(true) => {}
                         Ok(false) => break,
                         Err(error) => return Watched::Unobservable(Failure::fault(error)),
                     }
-                    if let Err(error) = observer.observe(&observation) {
-                        return Watched::Unobservable(Failure::fault(error));
-                    }
+                    observer.observe(&observation);
                     self.tap.set_consumed(observer.ticks());
                     if observer.ticks() >= prepared.run.ticks {
                         return Watched::All;
