@@ -367,7 +367,7 @@ pub struct Thresholds {
 }
 
 /// Where processes run. Empty lists leave the choice to the operating system.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Placement {
     /// Core of the bridge.
@@ -378,6 +378,39 @@ pub struct Placement {
     pub servo_cores: Vec<usize>,
     /// FIFO priority of all services; absent for the ordinary scheduler.
     pub fifo_priority: Option<u8>,
+    /// For how long a process that waits gives way to others before it sleeps \[µs\]. With 0 it sleeps at once, and
+    /// must be woken each time.
+    pub yield_us: u32,
+    /// What to do about a right that a service asks for and doesn't have.
+    pub rt: MissingRights,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self {
+            bridge_core: None,
+            coordinator_core: None,
+            servo_cores: vec![],
+            fifo_priority: None,
+            yield_us: default_yield_us(),
+            rt: MissingRights::default(),
+        }
+    }
+}
+
+fn default_yield_us() -> u32 {
+    20
+}
+
+/// What to do about a core, a priority or locked memory that is not granted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MissingRights {
+    /// Go on without, and say so.
+    #[default]
+    Warn,
+    /// Refuse to run.
+    Strict,
 }
 
 /// What happens to processes that die.

@@ -16,8 +16,14 @@ pub struct Envelope {
     pub tick: u64,
     /// Index of the robot in its team, or 0 for payloads of the team.
     pub robot: u64,
-    /// When it was published, on the publisher's monotonic clock; 0 where no clock is read.
+    /// When it was published, on the publisher's monotonic clock; 0 where no clock is read, here and below.
     pub stamp_ns: u64,
+    /// When its publisher had heard the last of its inputs, or gave up waiting for it.
+    pub heard_ns: u64,
+    /// When its publisher had computed what came of that, and kept it.
+    pub kept_ns: u64,
+    /// When the phase that says it was due to begin; 0 in lockstep.
+    pub due_ns: u64,
 }
 
 /// Envelope and payload. Zeroed before use, so that unused tails are zero.

@@ -43,8 +43,8 @@ fn fields_cover_their_payload_without_gaps() {
 fn a_frame_is_its_envelope_and_its_payload() {
     fn question<P: Payload>() {
         assert_eq!(core::mem::offset_of!(Frame<P>, envelope), 0);
-        assert_eq!(core::mem::offset_of!(Frame<P>, payload), 40);
-        assert_eq!(size_of::<Frame<P>>(), 40 + size_of::<P>());
+        assert_eq!(core::mem::offset_of!(Frame<P>, payload), 64);
+        assert_eq!(size_of::<Frame<P>>(), 64 + size_of::<P>());
         assert_eq!(align_of::<Frame<P>>(), 8);
     }
     for_every_payload!(question);
@@ -57,7 +57,10 @@ fn the_envelope_is_laid_out_as_it_is_written_down() {
     assert_eq!(core::mem::offset_of!(Envelope, tick), 16);
     assert_eq!(core::mem::offset_of!(Envelope, robot), 24);
     assert_eq!(core::mem::offset_of!(Envelope, stamp_ns), 32);
-    assert_eq!(size_of::<Envelope>(), 40);
+    assert_eq!(core::mem::offset_of!(Envelope, heard_ns), 40);
+    assert_eq!(core::mem::offset_of!(Envelope, kept_ns), 48);
+    assert_eq!(core::mem::offset_of!(Envelope, due_ns), 56);
+    assert_eq!(size_of::<Envelope>(), 64);
 }
 
 #[test]

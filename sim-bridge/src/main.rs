@@ -4,8 +4,12 @@ use clap::Parser;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_process::{ServeError, ServiceArguments, serve};
 use mikoshi_resolution::write_world;
+use mikoshi_runtime::CountingAllocator;
 use mikoshi_sim_bridge::{BridgeParticipant, world_xml};
 use std::process::ExitCode;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     let ServiceArguments { place } = ServiceArguments::parse();

@@ -69,7 +69,7 @@ pub struct Figures {
 }
 
 /// What [`Figures`] come to.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 #[allow(missing_docs)]
 pub struct JudgedFigures {
     pub object: ObjectSummary,

@@ -10,6 +10,7 @@ mod course;
 mod figures;
 mod freshness;
 mod internal;
+mod latency;
 mod log;
 mod reader;
 mod summary;
@@ -19,6 +20,7 @@ mod truth;
 pub use canonical::{LogHash, Observation, Observed, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use freshness::Freshness;
+pub use latency::{LATE, LateTick, LatencyFigures, PhaseTimes, Span, SpanSummary, WorstTick};
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{

@@ -178,6 +178,8 @@ pub(crate) struct Slot {
 struct Progress {
     /// A [`Position`].
     position: AtomicU64,
+    /// How often its owner has asked for memory, where it counts that.
+    allocations: AtomicU64,
 }
 
 /// Who speaks for a service.
@@ -213,6 +215,10 @@ impl Slot {
 
     pub(crate) fn set_position(&self, position: Position) {
         self.progress.position.store(position.to_word(), Ordering::Release);
+    }
+
+    pub(crate) fn set_allocations(&self, allocations: u64) {
+        self.progress.allocations.store(allocations, Ordering::Relaxed);
     }
 
     pub(crate) fn process(&self) -> Option<ProcessIdentity> {
@@ -355,7 +361,7 @@ struct Header {
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi6");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi7");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -452,6 +458,12 @@ impl Board {
     /// The process in charge of this service, or the last that was.
     pub fn process_of(&self, service: ServiceId) -> Option<ProcessIdentity> {
         self.index_of(Role::Service(service)).and_then(|index| self.slots()[index].process())
+    }
+
+    /// How often the process of this service has asked for memory so far, if it counts that; 0 otherwise.
+    pub fn allocations_of(&self, service: ServiceId) -> Option<u64> {
+        let slot = &self.slots()[self.index_of(Role::Service(service))?];
+        Some(slot.progress.allocations.load(Ordering::Relaxed))
     }
 
     /// Whether a supervisor looks after the run.

@@ -10,9 +10,11 @@
 //! - **lockstep**: every service waits for its inputs, however long they take; nothing reads a clock.
 //! - **topic**: one payload about one robot, published once a tick.
 
+mod allocations;
 mod board;
 mod checkpoint;
 mod domain;
+mod double;
 mod error;
 mod member;
 mod pace;
@@ -27,8 +29,10 @@ mod topic;
 pub mod transport;
 mod wait;
 
+pub use allocations::CountingAllocator;
 pub use board::{Board, BoardError, Role, SlotStatus, State};
 pub use domain::{Domain, DomainError};
+pub use double::Double;
 pub use error::{FaultCode, TickError};
 pub use member::{Entry, JoinError, Member, TAP_LEAD_TICKS};
 pub use process::{ProcessIdentity, ProcessWatch};

@@ -1,5 +1,6 @@
 //! A process's place on the board: it waits there for others, and is woken there.
 
+use crate::allocations::allocations;
 use crate::board::{Board, BoardError, Role, Slot, State};
 use crate::pace::{Pace, now_ns, sleep_until};
 use crate::process::{ProcessIdentity, ProcessWatch};
@@ -270,6 +271,7 @@ impl Member {
     pub(crate) fn begin_phase(&self, at: Position) -> Result<(), TickError> {
         if self.is_in_charge() {
             self.slot().set_position(at);
+            self.slot().set_allocations(allocations());
         }
         let Position { tick, phase } = at;
         if phase > 0 {
@@ -316,7 +318,8 @@ impl Member {
 
     /// Begins a tick at its time. If that is more than a period ago, all that follows is later by as much: a
     /// world that stood still does not hurry afterwards.
-    pub(crate) fn begin_tick(&self, pace: &Pace, tick: u64) {
+    /// Returns that time.
+    pub(crate) fn begin_tick(&self, pace: &Pace, tick: u64) -> u64 {
         let now_ns = now_ns();
         match self.board.origin_ns() {
             Some(origin_ns) => {
@@ -326,8 +329,12 @@ impl Member {
                 } else {
                     sleep_until(start_ns);
                 }
+                start_ns
             }
-            None => self.board.set_origin_ns(now_ns.saturating_sub(pace.start_ns(0, tick)).max(1)),
+            None => {
+                self.board.set_origin_ns(now_ns.saturating_sub(pace.start_ns(0, tick)).max(1));
+                now_ns
+            }
         }
     }
 

@@ -15,7 +15,7 @@ pub struct WaitPolicy {
 }
 
 impl Default for WaitPolicy {
-    /// By `examples/empty_tick` (six processes on two cores, medians): an empty tick takes 31 us with
+    /// By `mikoshi latency --empty` (six processes on two cores, medians): an empty tick takes 31 us with
     /// any yielding from 20 us on, and 71 to 100 us without. Where there is work to do and others want
     /// the cores, longer yielding costs milliseconds at a time, since one that yields goes to the end of
     /// the queue, and one that is woken does not.

@@ -6,15 +6,12 @@ use core::alloc::{GlobalAlloc, Layout};
 use core::cell::Cell;
 use mikoshi_ipc_types::{Frame, ObjectTruth, ServiceId};
 use mikoshi_runtime::{
-    Board, Call, Entry, IceoryxTap, IceoryxTransport, InMemoryHub, Member, Observer, Participant, Placement,
-    Position, Replaceable, Role, RunDirectory, Session, Tap, TickError, TickSchedule, Transport, WaitPolicy,
-    run_in_one_thread, run_service,
+    Board, Call, Double, Entry, IceoryxTap, IceoryxTransport, InMemoryHub, Member, Observer, Participant,
+    Placement, Position, Replaceable, Role, RunDirectory, Session, Tap, TickError, TickSchedule, Transport,
+    WaitPolicy, run_in_one_thread, run_service,
 };
 use std::ops::ControlFlow;
 use std::os::unix::fs::PermissionsExt;
-
-mod support;
-use support::Double;
 
 /// Counts what each thread allocates.
 struct Counting;

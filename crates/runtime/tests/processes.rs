@@ -7,9 +7,10 @@ use mikoshi_ipc_types::{
     TeamState,
 };
 use mikoshi_runtime::{
-    Board, Call, Domain, Entry, FaultCode, IceoryxTap, IceoryxTransport, InMemoryHub, InOrder, Member,
-    OBSERVER_DEPTH, Observer, Participant, Placement, ProcessIdentity, Replaceable, Role, RunDirectory,
-    State, TAP_LEAD_TICKS, Tap, TickError, TickSchedule, WaitPolicy, run_in_one_thread, run_service,
+    Board, Call, Domain, Double, Entry, FaultCode, IceoryxTap, IceoryxTransport, InMemoryHub, InOrder,
+    Member, OBSERVER_DEPTH, Observer, Participant, Placement, ProcessIdentity, Replaceable, Role,
+    RunDirectory, State, TAP_LEAD_TICKS, Tap, TickError, TickSchedule, WaitPolicy, run_in_one_thread,
+    run_service,
 };
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
@@ -18,9 +19,6 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-
-mod support;
-use support::Double;
 
 const ROBOTS: usize = 4;
 /// More than any test waits for.

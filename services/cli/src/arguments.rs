@@ -109,6 +109,24 @@ Exit status:
   2  bad usage or configuration
   3  a fault of the system";
 
+const LATENCY_EXAMPLES: &str = "\
+Examples:
+  mikoshi latency config/scenarios/hold.toml --empty               (what the exchange of frames takes)
+  mikoshi latency config/scenarios/hold.toml --empty --set placement.yield_us=0
+  mikoshi latency config/scenarios/transport.toml --real-time --set placement.fifo_priority=20
+  mikoshi latency config/scenarios/transport.toml --load 2 --out /tmp/loaded
+  mikoshi latency --compare runs/latency-hold-0/latency.json /tmp/loaded/latency.json
+
+Times come from stamps that every frame carries: when its publisher had heard its inputs, had kept what came of
+them, and published it. Threads that only sleep, one on each core, say how late the machine itself wakes up who
+sleeps; with a FIFO priority they stand one above the services, and say whose fault a late tick is. The first 200
+ticks don't count.
+
+Exit status:
+  0  measured
+  2  bad usage or configuration
+  3  a fault of the system";
+
 const REPORT_EXAMPLES: &str = "\
 Examples:
   mikoshi report runs/hold-0                  (runs/hold-0/report/index.html)
@@ -168,6 +186,9 @@ pub enum Command {
     /// Kill processes of a run at random, and compare it with the same run undisturbed
     #[command(after_help = SOAK_EXAMPLES)]
     Soak(SoakArguments),
+    /// Measure how long frames and services take, beside what the machine adds
+    #[command(after_help = LATENCY_EXAMPLES)]
+    Latency(LatencyArguments),
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
@@ -318,6 +339,46 @@ pub struct SoakArguments {
     /// No table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// `mikoshi latency`.
+#[derive(Args, Debug)]
+pub struct LatencyArguments {
+    /// The scenario's file, such as config/scenarios/hold.toml
+    #[arg(required_unless_present = "compare")]
+    pub file: Option<PathBuf>,
+    /// Seed of everything random, in place of the scenario's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Put a value in place of the scenario's; an empty one takes the key away
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub overrides: Vec<(String, String)>,
+    /// Services compute nothing: what the exchange of frames takes by itself
+    #[arg(long)]
+    pub empty: bool,
+    /// Pace ticks by the clock
+    #[arg(long)]
+    pub real_time: bool,
+    /// Threads that compute beside the run, at ordinary priority
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub load: usize,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Lay two results beside each other
+    #[arg(long, num_args = 2, value_names = ["A.json", "B.json"], conflicts_with = "file")]
+    pub compare: Vec<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub results: ResultsArguments,
+}
+
+impl LatencyArguments {
+    /// Which scenario, if one is to be measured.
+    pub fn scenario(&self) -> Option<ScenarioArguments> {
+        let (scenario, overrides) = (self.file.clone()?, self.overrides.clone());
+        Some(ScenarioArguments { scenario, seed: self.seed, overrides })
+    }
 }
 
 /// `mikoshi report`.

@@ -8,6 +8,8 @@ use std::process::{Command, Stdio};
 
 /// All services in one thread.
 pub const IN_PROCESS: &str = "mikoshi-in-process";
+/// A service that computes nothing.
+pub const EMPTY: &str = "mikoshi-empty";
 /// What a program's exit status is when the loader can't find one of its libraries.
 const LOADER_FAILED: i32 = 127;
 

@@ -47,9 +47,15 @@ impl Children {
     ///
     /// # Errors
     /// Its program is missing or can't be started.
-    pub fn spawn(&mut self, service: ServiceId, label: String, robot: Option<&str>) -> Result<(), Failure> {
+    pub fn spawn(
+        &mut self,
+        service: ServiceId,
+        label: String,
+        robot: Option<&str>,
+        variant: Variant,
+    ) -> Result<(), Failure> {
         let robot = robot.map(str::to_owned);
-        let process = self.start(service, label, robot, Variant::default(), &[])?;
+        let process = self.start(service, label, robot, variant, &[])?;
         self.processes.push(process);
         Ok(())
     }
@@ -260,6 +266,7 @@ impl Children {
         if let Some(robot) = &robot {
             command.args(["--robot", robot]);
         }
+        command.args(&variant.arguments);
         if let Some(spec) = &variant.spec {
             command.arg("--spec").arg(spec);
         }

@@ -17,6 +17,7 @@ mod fraction;
 mod gain;
 pub mod interrupts;
 mod judge;
+mod latency;
 mod observed_run;
 pub mod observer;
 mod orphans;
@@ -61,6 +62,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Stop(arguments) => commands::operator::stop(arguments).map(|()| Status::Met),
         Command::Resume(arguments) => commands::operator::resume(arguments).map(|()| Status::Met),
         Command::Soak(arguments) => soak::soak(arguments),
+        Command::Latency(arguments) => latency::latency(arguments),
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),

@@ -4,6 +4,7 @@ use crate::arguments::ResultsArguments;
 use crate::failure::{Failure, as_lines};
 use crate::feed::Feed;
 use crate::judge;
+use crate::latency::{Costs, WARM_UP_TICKS};
 use crate::observed_run::observed_run;
 use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
@@ -14,13 +15,18 @@ use crate::wall_clock::Stopwatch;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
-    Fault, Figures, Freshness, LogHash, LogWriter, Observation, Summary, Swap, Timing, WriteLogError,
+    Fault, Figures, Freshness, LatencyFigures, LogHash, LogWriter, Observation, Summary, Swap, Timing,
+    WriteLogError,
 };
+use mikoshi_runtime::Board;
 use std::path::Path;
 
 /// Observes a run: figures, hash, log, progress.
 pub struct RunObserver {
-    figures: Figures,
+    /// None where nothing is carried.
+    figures: Option<Figures>,
+    /// Where times are measured.
+    latency: Option<(LatencyFigures, Costs)>,
     hash: LogHash,
     log: Option<LogWriter>,
     /// Why and from which tick on there is no log.
@@ -34,6 +40,8 @@ pub struct RunObserver {
     stops: Stops,
     first_tick: Option<u64>,
     ticks: u64,
+    /// While all processes still work.
+    last_counted_tick: u64,
     clock: Stopwatch,
 }
 
@@ -50,7 +58,8 @@ impl RunObserver {
         let run = &prepared.run;
         let log = (!arguments.no_log).then(|| LogWriter::create(&out.run_log(), run));
         Ok(Self {
-            figures: Figures::new(observed_run(run, prepared.law.internal_forces())?),
+            figures: Some(Figures::new(observed_run(run, prepared.law.internal_forces())?)),
+            latency: None,
             hash: LogHash::default(),
             log: log.transpose().map_err(Failure::fault)?,
             log_failure: None,
@@ -63,8 +72,35 @@ impl RunObserver {
             stops: Stops::of(run),
             first_tick: None,
             ticks: 0,
+            last_counted_tick: run.ticks.saturating_sub(WARM_UP_TICKS),
             clock: Stopwatch::start(),
         })
+    }
+
+    /// Measures times, too; of services that compute nothing nothing else.
+    #[must_use]
+    pub fn measuring(mut self, prepared: &Prepared) -> Self {
+        let scenario = &prepared.run.scenario;
+        let (period_s, delay_ticks) = (scenario.control_period_s, scenario.coordination_delay_ticks);
+        let figures = LatencyFigures::new(period_s, delay_ticks, WARM_UP_TICKS);
+        self.latency = Some((figures, Costs::default()));
+        self.figures = self.figures.filter(|_| !prepared.is_empty);
+        self
+    }
+
+    /// What was measured.
+    pub fn measured(&mut self) -> (LatencyFigures, Costs) {
+        self.latency.take().unwrap_or_else(|| (LatencyFigures::new(1.0, 0, 0), Costs::default()))
+    }
+
+    /// Counts what processes ask the system for between the end of the warm-up and that of the run.
+    pub fn count_costs(&mut self, board: &Board) {
+        let Some((_, costs)) = &mut self.latency else { return };
+        if self.ticks >= WARM_UP_TICKS && !costs.has_begun() {
+            costs.begin(board);
+        } else if self.ticks == self.last_counted_tick {
+            costs.end(board);
+        }
     }
 
     /// Lets other processes see what is observed of the run in this directory.
@@ -87,7 +123,12 @@ impl RunObserver {
     /// Takes in one tick. That the log can't be written is no reason to stop anybody: it is told at the end.
     pub fn observe(&mut self, observation: &Observation) {
         self.hash.observe(observation);
-        self.figures.observe(observation);
+        if let Some(figures) = &mut self.figures {
+            figures.observe(observation);
+        }
+        if let Some((latency, _)) = &mut self.latency {
+            latency.observe(observation);
+        }
         self.stamps.observe(observation.object_truth.envelope.stamp_ns);
         let written = self.log.as_mut().map_or(Ok(()), |log| log.write(observation));
         self.note_log(observation.tick(), written);
@@ -151,7 +192,9 @@ impl RunObserver {
         if let Some(feed) = self.feed.take() {
             feed.end();
         }
-        let (figures, scenario) = (self.figures.finish(), &run.scenario);
+        let is_judged = self.figures.is_some();
+        let figures = self.figures.map(Figures::finish).unwrap_or_default();
+        let scenario = &run.scenario;
         let first_tick = self.first_tick.unwrap_or_default();
         let sim_time_s = (self.ticks - first_tick) as f64 * scenario.control_period_s;
         let freshness = &self.freshness;
@@ -191,7 +234,7 @@ impl RunObserver {
         };
         if self.ticks < run.ticks {
             summary.failures.push(format!("the run ended after {} of {} ticks", self.ticks, run.ticks));
-        } else {
+        } else if is_judged {
             summary.failures = judge::failures(scenario, &summary);
         }
         summary.failures.extend(self.log_failure);

@@ -56,6 +56,7 @@ impl Orphan {
             variant: Variant {
                 spec: value_of("--spec").map(PathBuf::from),
                 program: arguments.first().map(PathBuf::from),
+                arguments: vec![],
             },
             log: fs::read_link(process.join("fd/2")).ok().filter(|log| log.is_file()),
         })

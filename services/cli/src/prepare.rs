@@ -18,6 +18,8 @@ pub struct Prepared {
     pub law: HybridLaw,
     /// Its schedule.
     pub schedule: TickSchedule,
+    /// Whether its services are to compute nothing.
+    pub is_empty: bool,
 }
 
 /// Reads, checks and resolves a scenario.
@@ -42,7 +44,7 @@ pub fn prepare_with(
     let arms = team_arms(&run).map_err(Failure::usage)?;
     let law = build_hybrid_law(&run).map_err(|error| place(&loaded, error))?;
     let schedule = tick_schedule(&run).map_err(Failure::usage)?;
-    Ok(Prepared { run, arms, law, schedule })
+    Ok(Prepared { run, arms, law, schedule, is_empty: false })
 }
 
 /// The same of a run that is known already.
@@ -53,7 +55,7 @@ pub fn prepare_resolved(run: RunSpec) -> Result<Prepared, Failure> {
     let arms = team_arms(&run).map_err(Failure::usage)?;
     let law = build_hybrid_law(&run).map_err(Failure::usage)?;
     let schedule = tick_schedule(&run).map_err(Failure::usage)?;
-    Ok(Prepared { run, arms, law, schedule })
+    Ok(Prepared { run, arms, law, schedule, is_empty: false })
 }
 
 /// Says where what the law objects to was written.

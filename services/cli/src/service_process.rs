@@ -36,6 +36,8 @@ pub struct Variant {
     pub spec: Option<PathBuf>,
     /// Its program.
     pub program: Option<PathBuf>,
+    /// What else it is told.
+    pub arguments: Vec<String>,
 }
 
 /// How a process ended.

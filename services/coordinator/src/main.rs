@@ -4,7 +4,11 @@ use clap::Parser;
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_process::{ServeError, ServiceArguments, serve};
+use mikoshi_runtime::CountingAllocator;
 use std::process::ExitCode;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     let arguments = ServiceArguments::parse();

@@ -4,7 +4,9 @@
 
 use clap::{Args, Parser};
 use core::fmt::Display;
+use core::time::Duration;
 use mikoshi_config::RunSpec;
+use mikoshi_config::scenario::MissingRights;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_resolution::{read_run, read_spec, tick_schedule};
 use mikoshi_runtime::{
@@ -109,12 +111,17 @@ fn try_serve<P: Replaceable>(
     let run = run.map_err(ServeError::fault)?;
     let schedule = tick_schedule(&run).map_err(ServeError::configuration)?;
     let service = service(&run)?;
+    let placement = &run.scenario.placement;
+    let policy = WaitPolicy { yield_for: Duration::from_micros(placement.yield_us.into()) };
     let core = schedule.phases_of(service).find_map(|phase| phase.core);
     let real_time = RealTime {
         core,
-        fifo_priority: run.scenario.placement.fifo_priority,
+        fifo_priority: placement.fifo_priority,
         lock_memory: matches!(schedule.clock(), Clock::Wall { .. }),
-        on_missing_right: OnMissingRight::Warn,
+        on_missing_right: match placement.rt {
+            MissingRights::Warn => OnMissingRight::Warn,
+            MissingRights::Strict => OnMissingRight::Fail,
+        },
     };
     for missing in real_time.apply().map_err(ServeError::fault)? {
         eprintln!("warning: {missing}");
@@ -124,7 +131,7 @@ fn try_serve<P: Replaceable>(
         (_, true) => Entry::Standby,
         _ => Entry::Vacant,
     };
-    let member = Member::join(directory, Role::Service(service), WaitPolicy::default(), entry);
+    let member = Member::join(directory, Role::Service(service), policy, entry);
     let member = member.map_err(ServeError::fault)?;
     let transport = IceoryxTransport::open(directory, member, &schedule).map_err(ServeError::fault)?;
     let mut participant = build(&run, &transport)?;

@@ -3,8 +3,12 @@
 use clap::Parser;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_process::{RobotServiceArguments, ServeError, serve};
+use mikoshi_runtime::CountingAllocator;
 use mikoshi_servo::ServoParticipant;
 use std::process::ExitCode;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     let RobotServiceArguments { place, robot: name } = RobotServiceArguments::parse();

@@ -7,6 +7,7 @@ mod determinism;
 mod environment;
 mod faults;
 mod job;
+mod latency;
 mod leader_follower;
 mod real_time;
 mod record;

@@ -11,7 +11,7 @@ use super::{
 use crate::board::{Role, State};
 use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
 use crate::member::{Member, TAP_LEAD_TICKS};
-use crate::pace::Pace;
+use crate::pace::{Pace, now_ns};
 use crate::shared_memory::populate;
 use crate::wait::Reason;
 use crate::{Clock, Domain, DomainError, Position, Replaceable, Session, TickError, TickSchedule, Topic};
@@ -25,7 +25,6 @@ use iceoryx2::prelude::{LogLevel, Node, NodeBuilder, SignalHandlingMode, ipc, se
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
-use rustix::time::{ClockId, clock_gettime};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -100,6 +99,11 @@ pub(super) struct Process {
     pace: Option<Pace>,
     /// When the inputs of the current phase are due.
     due_ns: Cell<Option<u64>>,
+    /// When the last input came, or was given up, and when what came of it was kept.
+    heard_ns: Cell<u64>,
+    kept_ns: Cell<u64>,
+    /// When the current phase was due.
+    phase_due_ns: Cell<u64>,
     run: PathBuf,
     domain: Domain,
     ports: Ports,
@@ -143,8 +147,19 @@ impl Process {
             Role::Service(service) => Pace::of(schedule, service),
             Role::Supervisor | Role::Tap => None,
         };
-        let (schedule, due_ns) = (schedule.clone(), Cell::new(None));
-        Ok(Rc::new(Self { node, member, schedule, pace, due_ns, run, domain, ports }))
+        Ok(Rc::new(Self {
+            node,
+            member,
+            schedule: schedule.clone(),
+            pace,
+            due_ns: Cell::new(None),
+            heard_ns: Cell::default(),
+            kept_ns: Cell::default(),
+            phase_due_ns: Cell::default(),
+            run,
+            domain,
+            ports,
+        }))
     }
 
     fn service<P: Payload>(&self, topic: Topic) -> Result<Factory<P>, ConnectError> {
@@ -299,13 +314,14 @@ impl Session for IceoryxTransport {
     }
 
     fn begin_phase(&self, at: Position) -> Result<(), TickError> {
-        let Process { member, pace, due_ns, .. } = &*self.process;
+        let Process { member, pace, due_ns, phase_due_ns, .. } = &*self.process;
         member.begin_phase(at)?;
         let opens_tick = self.opens_tick && at.phase == 0;
         match pace {
-            Some(pace) if opens_tick => member.begin_tick(pace, at.tick),
+            Some(pace) if opens_tick => phase_due_ns.set(member.begin_tick(pace, at.tick)),
             Some(pace) => {
                 due_ns.set(member.board().origin_ns().and_then(|origin_ns| pace.due_ns(origin_ns, at)));
+                phase_due_ns.set(due_ns.get().unwrap_or_default());
             }
             None if opens_tick => member.wait_for_tap((at.tick + 1).saturating_sub(TAP_LEAD_TICKS))?,
             None => {}
@@ -314,10 +330,12 @@ impl Session for IceoryxTransport {
     }
 
     fn keep(&self, at: Position, participant: &mut impl Replaceable) -> Result<(), TickError> {
-        match &mut *self.checkpoint.borrow_mut() {
+        let kept = match &mut *self.checkpoint.borrow_mut() {
             Some(writer) => writer.write(at, |state| participant.save(state)),
             None => Err(TickError::Checkpoint("the session has not started")),
-        }
+        };
+        self.process.kept_ns.set(now_ns());
+        kept
     }
 
     fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {
@@ -424,6 +442,9 @@ impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
             tick,
             robot: self.topic.robot as u64,
             stamp_ns: 0,
+            heard_ns: self.process.heard_ns.get(),
+            kept_ns: self.process.kept_ns.get(),
+            due_ns: self.process.phase_due_ns.get(),
         };
         Ok(IceoryxLoan { sample, publisher: self })
     }
@@ -442,8 +463,7 @@ impl<P: Payload> Loan<P> for IceoryxLoan<'_, P> {
 
     fn send(mut self) -> Result<(), TickError> {
         let publisher = self.publisher;
-        let now = clock_gettime(ClockId::Monotonic);
-        self.sample.payload_mut().envelope.stamp_ns = now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64;
+        self.sample.payload_mut().envelope.stamp_ns = now_ns();
         self.sample.send().map_err(|_| TickError::TransportFailed { topic: publisher.topic })?;
         let slots = publisher.process.member.board().slots();
         for slot in publisher.readers.iter().filter_map(|index| slots.get(*index)) {
@@ -471,6 +491,14 @@ pub struct IceoryxSubscriber<P: Payload> {
 
 impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
+        let received = self.receive_in_time(tick, frame);
+        self.process.heard_ns.set(now_ns());
+        received
+    }
+}
+
+impl<P: Payload> IceoryxSubscriber<P> {
+    fn receive_in_time(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
         let Self { process, port, topic, reason, from, phase, arrived, early } = self;
         let (topic, due_ns) = (*topic, process.due_ns.get());
         let missing = TickError::InputMissing { topic, tick };

@@ -183,7 +183,7 @@ impl<P: Payload> Publisher<P> for InMemoryPublisher<P> {
             epoch: CHARGE.epoch,
             tick,
             robot: self.topic.robot as u64,
-            stamp_ns: 0,
+            ..Envelope::default()
         };
         Ok(InMemoryLoan { publisher: self })
     }

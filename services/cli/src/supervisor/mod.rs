@@ -4,6 +4,7 @@
 mod successors;
 mod verdict;
 
+use crate::binaries;
 use crate::children::Children;
 use crate::failure::{Failure, as_lines};
 use crate::interrupts::Interrupts;
@@ -13,7 +14,7 @@ use crate::output_directory::OutputDirectory;
 use crate::prepare::Prepared;
 use crate::print::print_error;
 use crate::requests::Requests;
-use crate::service_process::ServiceProcess;
+use crate::service_process::{ServiceProcess, Variant};
 use crate::standstill::Standstill;
 use crate::succession::Succession;
 use crate::wall_clock::{Stopwatch, pause};
@@ -128,7 +129,7 @@ impl Supervisor {
         let requests = Requests::listen(directory).map_err(Failure::fault)?;
         let mut children = Children::of(directory, logs);
         for (service, label, robot) in services_of(prepared) {
-            children.spawn(service, label, robot)?;
+            children.spawn(service, label, robot, variant_of(prepared, service)?)?;
         }
         // While services set themselves up.
         let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
@@ -199,6 +200,7 @@ impl Supervisor {
                     }
                     observer.observe(&observation);
                     self.tap.set_consumed(observer.ticks());
+                    observer.count_costs(self.member.board());
                     if observer.ticks() >= prepared.run.ticks {
                         return Watched::All;
                     }
@@ -328,6 +330,18 @@ fn services_of(prepared: &Prepared) -> impl Iterator<Item = (ServiceId, String, 
     let run = &prepared.run;
     let named = |service| (service, label_of(run, service), robot_name(run, service));
     prepared.schedule.services().into_iter().map(named)
+}
+
+/// Which program a service is.
+fn variant_of(prepared: &Prepared, service: ServiceId) -> Result<Variant, Failure> {
+    if !prepared.is_empty {
+        return Ok(Variant::default());
+    }
+    let arguments = match service {
+        ServiceId::Servo(_) => vec![],
+        ServiceId::Bridge | ServiceId::Coordinator => vec!["--service".to_owned(), service.to_string()],
+    };
+    Ok(Variant { program: Some(binaries::find(binaries::EMPTY)?), arguments, ..Variant::default() })
 }
 
 /// Whether ticks are paced by the clock.
