@@ -32,10 +32,14 @@ impl<T: Transport, P: ServicePayload> Inlet<T, P> {
         Ok(Self { port: transport.subscriber(robot)?, age_ticks, frame: Box::new(Frame::zeroed()) })
     }
 
-    /// The payload that is used in this tick; in the first ticks there is none, and it is zero.
+    /// The payload that is used in this tick; in the first ticks there is none, and it is zero. By the clock it may
+    /// be what came last.
     fn receive(&mut self, tick: u64) -> Result<&P, TickError> {
         if let Some(tick) = tick.checked_sub(self.age_ticks) {
-            self.port.receive(tick, &mut self.frame)?;
+            match self.port.receive(tick, &mut self.frame) {
+                Ok(()) | Err(TickError::InputMissing { .. }) => {}
+                Err(error) => return Err(error),
+            }
         }
         Ok(&self.frame.payload)
     }

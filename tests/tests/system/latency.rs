@@ -9,7 +9,7 @@ const SHORT: [&str; 4] = ["--set", "duration_s=4", "--set", "hybrid.start_s=1"];
 
 fn latency(arguments: &[&str], out: &Path) -> Said {
     let scenario = of_project("hold");
-    let arguments = arguments.iter().chain(&SHORT).map(Path::new);
+    let arguments = SHORT.iter().chain(arguments).map(Path::new);
     let results = [Path::new("--no-log"), Path::new("--out"), out];
     say_mikoshi([Path::new("latency"), &scenario].into_iter().chain(arguments).chain(results))
 }
