@@ -100,10 +100,11 @@ pub use gain_bound::{RECOMMENDED_SHARE, critical_loop_gain};
 pub use generalized::{Generalized, GeneralizedForce, GeneralizedPosition, GeneralizedVelocity};
 pub use hybrid::{
     BuildHybridLawError, ForceGains, HandInput, HandReference, HandStiffness, HybridError, HybridInputs,
-    HybridLaw, HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, StartHybridError,
+    HybridLaw, HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, ReformError,
+    StartHybridError,
 };
 pub use internal_forces::{
-    BuildInternalForcesError, InternalForces, OBJECT_ROW, RowCombination, change_of_representation,
+    BuildInternalForcesError, FormError, Formation, FormedForces, InternalForces, OBJECT_ROW, RowCombination, change_of_representation,
     pair_matrix, pairwise_forces,
 };
 pub use landmark::{BuildLandmarkError, FrameCorrection, Landmark, LandmarkParameters, Sighting};
