@@ -90,6 +90,7 @@ mod hybrid;
 mod internal_forces;
 mod landmark;
 mod linear;
+mod parting;
 mod selection;
 mod team_arms;
 mod torque;
@@ -109,6 +110,7 @@ pub use internal_forces::{
 };
 pub use landmark::{BuildLandmarkError, FrameCorrection, Landmark, LandmarkParameters, Sighting};
 pub use linear::Linear;
+pub use parting::{Gap, Parting, PartingLimits};
 pub use selection::{Axis, Control, Selection};
 pub use team_arms::{BuildTeamArmsError, RobotArms, TeamArms};
 pub use torque::{joint_torques, tip_wrenches};

@@ -53,7 +53,7 @@ impl Formation {
     }
 
     /// Overwrites every number: the next [`InternalForces::form`] makes all of them anew.
-    pub(crate) fn poison(&mut self) {
+    pub fn poison(&mut self) {
         // Where C is a matrix nothing is ever formed.
         if !self.counts.is_empty() {
             self.w_inverse.fill(f64::NAN);
