@@ -2,12 +2,14 @@
 //!
 //! A hand that holds moves with the object, but for what its grasp yields to its wrench. With g_i the displacement from the
 //! team's object (eq. 27) to where the tip of arm i has it, less what its grasp yields, less what that was when the sticks
-//! were made, a hand has left its grip by g_i at its own origin, but for two things:
+//! were made, a hand has left its grip by g_i at its own origin, but for three things:
 //!
 //! - Of n arms each has a part in the mean: one that is off by s is seen off by (n − 1)/n s.
 //! - What a robot says of its hands is in the world of its odometry, which errs a little with every step
 //!   ([`Landmark`](crate::Landmark)). All its hands have that in common. Between k hands of one robot, those of whom
 //!   b_i = k/(k − 1) (g_i − mean of g over its hands) is left, odometry explains nothing.
+//!
+//! - How much a grasp yields is known as well as it has been calibrated: what is less by a part of that is in doubt.
 //!
 //! So a hand has parted if it has from its robot's other hands, and is the one of them that is off the team's object the
 //! most; or if it is off the team's object by more than odometry explains.
@@ -40,6 +42,8 @@ pub struct Gap {
     pub tip: Twist<World>,
     /// From there to the hand's origin \[m\].
     pub lever: Vector3<f64>,
+    /// By how much of it the grasp may have yielded otherwise than it was thought to, at the hand.
+    pub doubt: Parting,
 }
 
 impl PartingLimits {
@@ -63,6 +67,7 @@ impl PartingLimits {
         let k = present.clone().count();
         let mean = present.fold(Twist::zero(), |sum, gap| sum + gap.tip) * (1.0 / k.max(1) as f64);
         let among = share_of_others(k);
+        let doubt = gaps.iter().flatten().fold(Parting::NONE, |most, gap| most.or(&gap.doubt));
         let (mut farthest, mut suspect) = (0.0, None);
         for (arm, (gap, slip)) in gaps.iter().zip(slips.iter_mut()).enumerate() {
             let Some(gap) = gap else {
@@ -70,10 +75,11 @@ impl PartingLimits {
                 continue;
             };
             let off_team = gap.at_hand(gap.tip * whole);
-            *slip = self.slip.multiple(&off_team.less(&self.odometry));
+            *slip = self.slip.multiple(&off_team.less(&self.odometry).less(&gap.doubt));
             let off = self.slip.multiple(&off_team);
             if off > farthest {
-                (farthest, suspect) = (off, Some((arm, self.slip.multiple(&gap.at_hand((gap.tip - mean) * among)))));
+                let off_robot = gap.at_hand((gap.tip - mean) * among).less(&gap.doubt).less(&doubt);
+                (farthest, suspect) = (off, Some((arm, self.slip.multiple(&off_robot))));
             }
         }
         if let Some((slip, off)) = suspect.and_then(|(arm, off)| Some((slips.get_mut(arm)?, off))) {
@@ -95,6 +101,13 @@ impl Gap {
 }
 
 impl Parting {
+    /// None.
+    pub const NONE: Self = Self { m: 0.0, rad: 0.0 };
+
+    fn or(&self, other: &Self) -> Self {
+        Self { m: self.m.max(other.m), rad: self.rad.max(other.rad) }
+    }
+
     fn less(&self, explained: &Self) -> Self {
         Self { m: (self.m - explained.m).max(0.0), rad: (self.rad - explained.rad).max(0.0) }
     }

@@ -80,8 +80,12 @@ impl GraspCompliance {
         stick: &VirtualStick,
         wrench: &Wrench<World>,
     ) -> Twist<World> {
-        let grip = -Twist::new(wrench.force * self.m_n, wrench.moment * self.rad_nm);
-        grip.shifted(&stick.vector(X_WH))
+        self.grip_yield(wrench).shifted(&stick.vector(X_WH))
+    }
+
+    /// How far the object is displaced in a hand's grip.
+    pub(crate) fn grip_yield(&self, wrench: &Wrench<World>) -> Twist<World> {
+        -Twist::new(wrench.force * self.m_n, wrench.moment * self.rad_nm)
     }
 }
 

@@ -14,6 +14,9 @@ use mikoshi_spatial::{Object, Pose, Twist, World, Wrench};
 
 /// By how much a robot's odometry may be off: in ten minutes of walking robots are not off by half of it.
 const ODOMETRY: Parting = Parting { m: 0.006, rad: 0.01 };
+/// The part of what a grasp is thought to yield that it may not, or yield more: with the object on a pedestal a grasp
+/// turns a third further than in the air.
+const DOUBT: f64 = 0.5;
 /// For how many ticks in a row a gripper must say that it is open.
 const PATIENCE_TICKS: u64 = 5;
 
@@ -34,6 +37,8 @@ pub(crate) struct Grips {
 pub(crate) struct GripState {
     /// Where each tip had the object when the law started, in the object's axes.
     at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
+    /// How far each grasp had yielded then, at the hand, in the object's axes.
+    yielded_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// For how many ticks each hand has slipped.
     slipping: [u64; MAX_HANDS_OF_TEAM],
     /// For how many ticks each gripper has said that it is open.
@@ -104,6 +109,9 @@ impl Grips {
         seen: &Seen<'_>,
     ) {
         (state.slipping, state.open) = ([0; MAX_HANDS_OF_TEAM], [0; MAX_HANDS_OF_TEAM]);
+        for (slot, wrench) in state.yielded_at_start.iter_mut().zip(seen.hand_wrench) {
+            *slot = self.yielded(seen, wrench).to_array();
+        }
         self.remember(state, hybrid, seen, &[Twist::zero(); MAX_HANDS_OF_TEAM]);
     }
 
@@ -131,15 +139,23 @@ impl Grips {
         seen: &Seen<'_>,
     ) -> [Option<Gap>; MAX_HANDS_OF_TEAM] {
         let mut gaps = [None; MAX_HANDS_OF_TEAM];
-        for (arm, (gap, at_start)) in gaps.iter_mut().zip(&state.at_start).enumerate() {
+        let at_start = state.at_start.iter().zip(&state.yielded_at_start).zip(seen.hand_wrench);
+        for (arm, (gap, ((at_start, yielded_at_start), wrench))) in gaps.iter_mut().zip(at_start).enumerate() {
             let at_start = Twist::<Object>::from_array(at_start).expressed_in(seen.X_WA);
+            let doubt = (self.yielded(seen, wrench) - Twist::from_array(yielded_at_start)) * DOUBT;
             let tip = self.tip(hybrid, seen, arm);
             *gap = tip.map(|(tip, hand)| Gap {
                 tip: tip - at_start,
                 lever: hand.pose.translation - seen.X_WA.translation,
+                doubt: Parting { m: doubt.linear.norm(), rad: doubt.angular.norm() },
             });
         }
         gaps
+    }
+
+    /// How far a grasp yields to a wrench, at the hand, in the object's axes.
+    fn yielded(&self, seen: &Seen<'_>, wrench: &[f64; 6]) -> Twist<Object> {
+        self.compliance.grip_yield(&Wrench::from_array(wrench)).expressed_in(&seen.X_WA.inverse())
     }
 
     /// From the team's object to where the tip of an arm that takes part has it, less what its grasp yields.

@@ -74,6 +74,8 @@ pub struct CoordinatorState {
     hand_wrench: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// Generalized force when the law started, row by row.
     force_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
+    /// How far the object's reference was off when the team was last formed, so that its error went on.
+    off_at_start: [f64; 6],
     /// The tick in which it started, or in which another one took its place.
     hybrid_since: u64,
     /// The tick since which it controls forces for the hands that it does.
@@ -187,6 +189,7 @@ impl Coordinator {
             leading: LeadingState::at_start(None, &Pose::identity(), &[]),
             hand_wrench: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
+            off_at_start: [0.0; 6],
             hybrid_since: 0,
             formed_since: 0,
             grips: GripState::zeroed(),
@@ -262,7 +265,8 @@ impl Coordinator {
         let clock = state.clock.advance(&self.timing, &wishes, may_walk).ok_or(CoordinateError::State)?;
 
         let since_start = [state.hybrid_since, state.formed_since].map(|since| tick.saturating_sub(since));
-        self.references.fill(since_start, &X_WA_ref, &state.force_at_start, force_ref, position_ref);
+        let start = (&state.force_at_start[..], &state.off_at_start);
+        self.references.fill(since_start, &X_WA_ref, start, force_ref, position_ref);
         // A leader's team has no hybrid law: hands are where leader and followers have them.
         let is_led = is_hybrid && self.leading.is_some();
         let reference = (is_hybrid && !is_led).then_some(HybridReference {
@@ -414,8 +418,10 @@ impl Coordinator {
         }
         let seen = grips::Seen { X_WA: &X_WA, hands: now.hands, hand_wrench: &state.hand_wrench };
         self.grips.remember(&mut state.grips, &state.hybrid, &seen, &off);
-        // Control of forces begins with what is there (ADR 0010).
+        // References begin with what is there (ADR 0010), and the object's with the error that there was.
         state.force_at_start = state.hybrid.filtered_force;
+        let since = now.tick.saturating_sub(state.formed_since);
+        state.off_at_start = (self.references.off_after(since, &state.off_at_start) + mean).to_array();
         state.formed_since = now.tick + 1;
         Ok(true)
     }
@@ -592,7 +598,7 @@ fn start_law(
     for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
         *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
     }
-    (state.hybrid_since, state.formed_since) = (tick, tick);
+    (state.hybrid_since, state.formed_since, state.off_at_start) = (tick, tick, [0.0; 6]);
     write_force(&law.force, &mut state.force_at_start);
 }
 

@@ -8,6 +8,7 @@ mod environment;
 mod faults;
 mod job;
 mod leader_follower;
+mod lost_grasp;
 mod real_time;
 mod record;
 mod replay;
