@@ -2,9 +2,7 @@
 
 use super::checks::{Checks, Violation};
 use crate::robot::RobotConfig;
-use crate::scenario::{
-    Control, Grasp, InternalForces, Job, LostGrasp, Member, Motion, Policy, Scenario,
-};
+use crate::scenario::{Control, Grasp, InternalForces, Job, LostGrasp, Member, Motion, Policy, Scenario};
 use mikoshi_ipc_types::{MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS};
 use std::collections::BTreeSet;
 

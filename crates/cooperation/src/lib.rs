@@ -105,8 +105,8 @@ pub use hybrid::{
     StartHybridError,
 };
 pub use internal_forces::{
-    BuildInternalForcesError, FormError, Formation, FormedForces, InternalForces, OBJECT_ROW, RowCombination, change_of_representation,
-    pair_matrix, pairwise_forces,
+    BuildInternalForcesError, FormError, Formation, FormedForces, InternalForces, OBJECT_ROW, RowCombination,
+    change_of_representation, pair_matrix, pairwise_forces,
 };
 pub use landmark::{BuildLandmarkError, FrameCorrection, Landmark, LandmarkParameters, Sighting};
 pub use linear::Linear;

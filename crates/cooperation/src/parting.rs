@@ -2,7 +2,7 @@
 //!
 //! A hand that holds moves with the object, but for what its grasp yields to its wrench. With g_i the displacement from the
 //! team's object (eq. 27) to where the tip of arm i has it, less what its grasp yields, less what that was when the sticks
-//! were made, a hand has left its grip by g_i at its own origin, but for three things:
+//! were made, all against their mean, a hand has left its grip by g_i at its own origin, but for three things:
 //!
 //! - Of n arms each has a part in the mean: one that is off by s is seen off by (n − 1)/n s.
 //! - What a robot says of its hands is in the world of its odometry, which errs a little with every step

@@ -123,10 +123,22 @@ fn rows_keep_their_meaning_when_an_arm_leaves() {
         4,
         4,
         &[
-            1.0, 0.0, 1.0, 1.0, // all
-            2.0 / 3.0, 0.0, -1.0 / 3.0, -1.0 / 3.0, // 1 · 2 / 3 of A's one hand less the mean of B's two
-            0.0, 0.0, 0.0, 0.0, // A has no two hands any more
-            0.0, 0.0, 0.5, -0.5,
+            1.0,
+            0.0,
+            1.0,
+            1.0, // all
+            2.0 / 3.0,
+            0.0,
+            -1.0 / 3.0,
+            -1.0 / 3.0, // 1 · 2 / 3 of A's one hand less the mean of B's two
+            0.0,
+            0.0,
+            0.0,
+            0.0, // A has no two hands any more
+            0.0,
+            0.0,
+            0.5,
+            -0.5,
         ],
     );
     assert!(is_close(&forces.among(&formation).w_and_c(), &rows));
@@ -165,7 +177,10 @@ fn reform(team: &mut ClosedLoop, takes_part: impl Fn(usize) -> bool) -> Result<(
 fn largest_step(team: &mut ClosedLoop) -> f64 {
     let before: Vec<_> = team.out.hands.iter().map(|hand| hand.pose).collect();
     team.tick(true);
-    let steps = before.iter().zip(&team.out.hands).map(|(before, now)| before.displacement_to(&now.pose).linear.norm());
+    let steps = before
+        .iter()
+        .zip(&team.out.hands)
+        .map(|(before, now)| before.displacement_to(&now.pose).linear.norm());
     steps.fold(0.0, f64::max)
 }
 

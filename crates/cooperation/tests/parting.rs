@@ -10,10 +10,8 @@ use mikoshi_spatial::Twist;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-const LIMITS: PartingLimits = PartingLimits {
-    slip: Parting { m: 0.003, rad: 0.01 },
-    odometry: Parting { m: 0.006, rad: 0.01 },
-};
+const LIMITS: PartingLimits =
+    PartingLimits { slip: Parting { m: 0.003, rad: 0.01 }, odometry: Parting { m: 0.006, rad: 0.01 } };
 
 /// Four robots with two hands each around an object, all in their grips.
 fn holding() -> Vec<Option<Gap>> {
@@ -25,7 +23,8 @@ fn holding() -> Vec<Option<Gap>> {
 fn slips(hands: &[Option<Gap>], of_robots: &[usize]) -> Vec<f64> {
     let n = hands.iter().flatten().count() as f64;
     let mean = hands.iter().flatten().fold(Twist::zero(), |sum, hand| sum + hand.tip) * (1.0 / n);
-    let seen: Vec<_> = hands.iter().map(|hand| hand.map(|hand| Gap { tip: hand.tip - mean, ..hand })).collect();
+    let seen: Vec<_> =
+        hands.iter().map(|hand| hand.map(|hand| Gap { tip: hand.tip - mean, ..hand })).collect();
     let mut slips = vec![f64::NAN; hands.len()];
     LIMITS.slips(&seen, of_robots, &mut slips);
     slips
@@ -40,7 +39,10 @@ fn displace(hands: &mut [Option<Gap>], i: usize, at_hand: Twist<mikoshi_spatial:
 #[test]
 fn a_hand_that_leaves_its_robots_other_hand_is_told_by_how_far() {
     for off in [0.5, 1.0, 2.0] {
-        for (linear, angular) in [(Vector3::new(0.0, 0.003, 0.0), Vector3::zeros()), (Vector3::zeros(), Vector3::new(0.01, 0.0, 0.0))] {
+        for (linear, angular) in [
+            (Vector3::new(0.0, 0.003, 0.0), Vector3::zeros()),
+            (Vector3::zeros(), Vector3::new(0.01, 0.0, 0.0)),
+        ] {
             let mut hands = holding();
             displace(&mut hands, 3, Twist::new(linear * off, angular * off));
             let slips = slips(&hands, &[2; 4]);

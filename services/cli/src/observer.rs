@@ -230,7 +230,9 @@ impl Stops {
         let left = self.hands.len() as u32 - team.absent_hands.count_ones();
         let code = stop_cause::name(team.loss_cause);
         for (_, (robot, hand)) in self.hands.iter().enumerate().filter(|(index, _)| lost >> index & 1 != 0) {
-            let text = format!("{robot}'s {hand} hand lost the object in tick {tick}: {code}, {left} hands are left");
+            let text = format!(
+                "{robot}'s {hand} hand lost the object in tick {tick}: {code}, {left} hands are left"
+            );
             print_error(&as_lines("warning", &text));
             // A team that stops for it says so itself.
             if team.stop_cause == 0 {

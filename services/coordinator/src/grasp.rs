@@ -34,11 +34,7 @@ impl GraspCompliance {
         let hybrid = &scenario.hybrid;
         let inverse = |stiffness: Option<f64>| stiffness.map_or(0.0, f64::recip);
         let filter_rad = core::f64::consts::TAU * hybrid.filter_hz * scenario.control_period_s;
-        Self {
-            m_n: inverse(n_m),
-            rad_nm: inverse(nm_rad),
-            filter_pole: (-filter_rad).exp(),
-        }
+        Self { m_n: inverse(n_m), rad_nm: inverse(nm_rad), filter_pole: (-filter_rad).exp() }
     }
 
     /// How far the object is from the mean of the sticks' tips (eq. 27), by the hands' filtered wrenches,

@@ -14,8 +14,7 @@ use mikoshi_spatial::{Object, Pose, Twist, World, Wrench};
 
 /// By how much a robot's odometry may be off: in ten minutes of walking robots are not off by half of it.
 const ODOMETRY: Parting = Parting { m: 0.006, rad: 0.01 };
-/// The part of what a grasp is thought to yield that it may not, or yield more: with the object on a pedestal a grasp
-/// turns a third further than in the air.
+/// The part of what a grasp is thought to yield that it may not, or yield more.
 const DOUBT: f64 = 0.5;
 /// For how many ticks in a row a gripper must say that it is open.
 const PATIENCE_TICKS: u64 = 5;
@@ -131,7 +130,8 @@ impl Grips {
         }
     }
 
-    /// Where each hand's tip has the object, less where it had it at the start.
+    /// Where each hand's tip has the object, less where it had it at the start, against the mean of all: what they apply to
+    /// something that holds the object displaces all alike.
     pub(crate) fn gaps(
         &self,
         state: &GripState,
@@ -140,7 +140,8 @@ impl Grips {
     ) -> [Option<Gap>; MAX_HANDS_OF_TEAM] {
         let mut gaps = [None; MAX_HANDS_OF_TEAM];
         let at_start = state.at_start.iter().zip(&state.yielded_at_start).zip(seen.hand_wrench);
-        for (arm, (gap, ((at_start, yielded_at_start), wrench))) in gaps.iter_mut().zip(at_start).enumerate() {
+        for (arm, (gap, ((at_start, yielded_at_start), wrench))) in gaps.iter_mut().zip(at_start).enumerate()
+        {
             let at_start = Twist::<Object>::from_array(at_start).expressed_in(seen.X_WA);
             let doubt = (self.yielded(seen, wrench) - Twist::from_array(yielded_at_start)) * DOUBT;
             let tip = self.tip(hybrid, seen, arm);
@@ -150,6 +151,9 @@ impl Grips {
                 doubt: Parting { m: doubt.linear.norm(), rad: doubt.angular.norm() },
             });
         }
+        let count = gaps.iter().flatten().count().max(1) as f64;
+        let mean = gaps.iter().flatten().fold(Twist::zero(), |sum, gap| sum + gap.tip) * (1.0 / count);
+        gaps.iter_mut().flatten().for_each(|gap| gap.tip = gap.tip - mean);
         gaps
     }
 
@@ -228,4 +232,3 @@ pub(crate) fn absent(hybrid: &HybridState<MAX_HANDS_OF_TEAM>) -> u64 {
     let arms = hybrid.is_absent.iter().enumerate();
     arms.fold(0, |set, (arm, is_absent)| set | u64::from(*is_absent != 0) << arm)
 }
-

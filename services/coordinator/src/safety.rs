@@ -111,8 +111,7 @@ impl Safety {
         let mut first = None;
         for (index, ((robot, hands), lasted)) in robots.zip(&mut state.lasted).enumerate() {
             for (cause, ticks) in stop_cause::ALL.into_iter().zip(lasted) {
-                *ticks =
-                    if self.is_wrong(cause, robot, hands) { ticks.saturating_add(1) } else { 0 };
+                *ticks = if self.is_wrong(cause, robot, hands) { ticks.saturating_add(1) } else { 0 };
                 let patience = match cause {
                     stop_cause::TORQUE => self.torque_ticks,
                     stop_cause::STALE => self.limits.stale_limit_ticks,
@@ -294,13 +293,7 @@ mod tests {
             word = operator::word_after(word, operator::RESUME);
         }
         assert_eq!((state.cause, state.robot), (stop_cause::BALANCE, 1));
-        safety.look(
-            &mut state,
-            1020,
-            core::iter::once((&well(), 0b11)),
-            false,
-            word,
-        );
+        safety.look(&mut state, 1020, core::iter::once((&well(), 0b11)), false, word);
         assert!(state.is_stopped(), "it still steps");
         word = operator::word_after(word, operator::RESUME);
         safety.look(&mut state, 1021, core::iter::once((&well(), 0b11)), true, word);

@@ -50,7 +50,8 @@ impl Team {
         let X_WA =
             Pose::<World, Object>::new(run.scenario.object.position_m.into(), UnitQuaternion::identity());
         let grips = run.robots.iter().flat_map(|robot| &robot.hand_in_object);
-        let grips: Vec<_> = grips.map(|array| Pose::<Object, Hand>::from_array(array).expect("a pose")).collect();
+        let grips: Vec<_> =
+            grips.map(|array| Pose::<Object, Hand>::from_array(array).expect("a pose")).collect();
         Self {
             state: coordinator.initial_state().expect("a state"),
             scratch: coordinator.scratch(),
@@ -129,7 +130,9 @@ impl Team {
 
     fn references(&self) -> Vec<PoseWire> {
         let robots = self.run.robots.iter().zip(&self.out.commands);
-        robots.flat_map(|(robot, command)| command.hand_pose_ref[..robot.grasping_hands.len()].to_vec()).collect()
+        robots
+            .flat_map(|(robot, command)| command.hand_pose_ref[..robot.grasping_hands.len()].to_vec())
+            .collect()
     }
 
     fn go_on(&mut self, ticks: u64) {
@@ -140,7 +143,8 @@ impl Team {
             if self.poisons {
                 scratch.poison();
             }
-            assert_no_alloc(|| coordinator.tick(self.tick, state, scratch, robots.iter(), out)).expect("commands");
+            assert_no_alloc(|| coordinator.tick(self.tick, state, scratch, robots.iter(), out))
+                .expect("commands");
             let references = self.references();
             for (hand, reference) in self.hands.iter_mut().zip(references) {
                 *hand = Pose::from_array(&reference).expect("a pose");
@@ -161,7 +165,9 @@ impl Team {
     /// Where the first hands are that still hold.
     fn is_in_every_grip(&self) -> bool {
         let mut holding = (0..self.hands.len()).filter(|hand| !self.lost.contains(hand));
-        holding.all(|hand| (self.X_WA * self.grips[hand]).displacement_to(&self.hands[hand]).linear.norm() < 1e-3)
+        holding.all(|hand| {
+            (self.X_WA * self.grips[hand]).displacement_to(&self.hands[hand]).linear.norm() < 1e-3
+        })
     }
 }
 

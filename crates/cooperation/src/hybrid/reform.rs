@@ -62,7 +62,9 @@ impl HybridLaw {
         }
         let (forces, X_AW) = (self.internal_forces(), X_WA.inverse());
         let WorkspaceScratch { tips, tip_twists, tip_wrenches, row_wrenches, work_wrenches, .. } = workspace;
-        for ((stick, array), (tip, hand)) in sticks.iter_mut().zip(&state.sticks).zip(tips.iter_mut().zip(hands)) {
+        for ((stick, array), (tip, hand)) in
+            sticks.iter_mut().zip(&state.sticks).zip(tips.iter_mut().zip(hands))
+        {
             stick.X_HB = Pose::from_array(array).ok_or(HybridError::InvalidState)?;
             *tip = stick.tip_pose(&hand.pose);
         }

@@ -119,13 +119,7 @@ impl GroupTree {
     }
 
     /// Downwards, sums of groups: the inverse of [`GroupTree::generalized_force`].
-    pub fn tip_forces<T: Linear>(
-        &self,
-        formation: &Formation,
-        rows: &[T],
-        tips: &mut [T],
-        sums: &mut [T],
-    ) {
+    pub fn tip_forces<T: Linear>(&self, formation: &Formation, rows: &[T], tips: &mut [T], sums: &mut [T]) {
         self.sweep_down(formation, rows, tips, sums, |share, sum, row| {
             (sum * share.left + row, sum * share.right - row)
         });
