@@ -291,7 +291,7 @@ impl Coordinator {
         let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
         move_open_hands(state, &mut law_output.hands, hand_step_m);
 
-        self.write_commands(tick, state, &phase, &X_WO, &present, law_output, out);
+        self.write_commands(tick, state, &phase, &X_WO, law_output, out);
         let reference = is_hybrid.then_some((&*force_ref, &*position_ref));
         write_team_state(state, &phase, law_output, reference, out);
         out.team_state.odometry_pose = X_WO.map(|X_WO| X_WO.to_array());
@@ -493,13 +493,13 @@ impl Coordinator {
         state: &CoordinatorState,
         phase: &Phase,
         X_WO: &[Pose<World, Odometry>; MAX_ROBOTS],
-        present: &[u64; MAX_ROBOTS],
         law: &HybridOutput,
         out: &mut CoordinatorOutputs,
     ) {
         let mut references = law.hands.iter();
+        let present = self.grips.present(&state.hybrid);
         let robots = self.hands_of_robots.iter().zip(&state.leading.clocks).zip(X_WO).zip(present);
-        for (command, (((&hands, own_clock), X_WO), &present)) in out.commands.iter_mut().zip(robots) {
+        for (command, (((&hands, own_clock), X_WO), present)) in out.commands.iter_mut().zip(robots) {
             let X_OW = X_WO.inverse();
             let clock = if self.leading.is_some() { own_clock } else { &state.clock };
             *command = TeamCommand {
