@@ -4,7 +4,7 @@ pub use crate::coordination::{Coordination, Policy};
 pub use crate::grasp::Grasp;
 pub use crate::job::Job;
 pub use crate::motion::{Motion, RandomMotion, Segment};
-pub use crate::world::{FixedBox, World};
+pub use crate::world::{FixedBox, GraspFailure, GraspFailureKind, World};
 use serde::{Deserialize, Serialize};
 
 /// One run, as `config/scenarios/*.toml` describe it. The team's file lies underneath: what the
@@ -447,8 +447,30 @@ pub struct Safety {
     pub torque_limit_s: f64,
     /// For how many ticks in a row a robot may say nothing, or hear nothing.
     pub stale_limit_ticks: u64,
+    /// How far a hand may be from its grip on the object, by where the others have the object and by what its wrench
+    /// explains, before it counts as slipping. Where nothing but its robot's odometry tells where it is, that
+    /// explains some millimetres more.
+    pub slip_m: f64,
+    /// The same about an axis.
+    pub slip_rad: f64,
+    /// For how many ticks in a row.
+    pub slip_ticks: u64,
+    /// What becomes of the team when a hand has lost the object.
+    pub lost_grasp: LostGrasp,
     /// What the operator says, and when.
     pub operator: Vec<OperatorEvent>,
+}
+
+/// What becomes of a team one of whose hands has lost the object. Internal forces are formed anew among the others
+/// in either case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LostGrasp {
+    /// It stops.
+    #[default]
+    Stop,
+    /// The other hands carry on, as long as they are hands of two robots.
+    CarryOn,
 }
 
 /// The operator says something.
@@ -480,6 +502,10 @@ impl Default for Safety {
             tilt_max_rad: 0.2,
             torque_limit_s: 0.5,
             stale_limit_ticks: 15,
+            slip_m: 0.003,
+            slip_rad: 0.01,
+            slip_ticks: 10,
+            lost_grasp: LostGrasp::Stop,
             operator: vec![],
         }
     }

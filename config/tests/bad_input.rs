@@ -627,3 +627,29 @@ proptest! {
         let _ = load(&root, &[&format!("robots.{key}={value}")]);
     }
 }
+
+#[test]
+fn a_grasp_failure_of_nobody_or_with_a_friction_that_shakes_the_object_is_refused() {
+    let with = |failure: &str| format!("world.grasp_failures=[{{{failure}}}]");
+    let text = |option: String| {
+        let root = fixture();
+        text_of(root.path(), load(root.path(), &[&option]))
+    };
+    let of_nobody = text(with(r#"robot = "Z", hand = "left", at_s = 1.0, kind = "open""#));
+    assert!(
+        of_nobody.contains("world.grasp_failures.0.robot") && of_nobody.contains("a robot of the team"),
+        "{of_nobody}"
+    );
+    let without_kind = text(with(r#"robot = "Z", hand = "left", at_s = 1.0"#));
+    assert!(without_kind.contains("kind"), "{without_kind}");
+    let shaking = text(with(r#"robot = "Z", hand = "left", at_s = 1.0, kind = "slip", friction_n = 1e6"#));
+    assert!(shaking.contains("world.grasp_failures.0.friction_n"), "{shaking}");
+}
+
+#[test]
+fn a_team_whose_internal_forces_are_not_formed_anew_does_not_carry_on() {
+    let root = fixture();
+    let options = ["safety.lost_grasp=carry-on", "hybrid.internal_forces=chain"];
+    let text = text_of(root.path(), load(root.path(), &options));
+    assert!(text.contains("safety.lost_grasp") && text.contains("balanced tree"), "{text}");
+}

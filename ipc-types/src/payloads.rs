@@ -73,9 +73,14 @@ pub mod stop_cause {
     pub const GRASP: u64 = 7;
     /// A robot has not been heard of for too long, or does not hear the others.
     pub const STALE: u64 = 8;
+    /// A hand that says it holds the object has parted from it.
+    pub const SLIP: u64 = 9;
+    /// Too few hands hold the object, or hands of one robot alone.
+    pub const TOO_FEW_HANDS: u64 = 10;
 
     /// All of them.
-    pub const ALL: [u64; 8] = [OPERATOR, INPUT, HAND_WRENCH, BALANCE, TILT, TORQUE, GRASP, STALE];
+    pub const ALL: [u64; 10] =
+        [OPERATOR, INPUT, HAND_WRENCH, BALANCE, TILT, TORQUE, GRASP, STALE, SLIP, TOO_FEW_HANDS];
 
     /// Its code in summaries.
     pub const fn name(cause: u64) -> &'static str {
@@ -88,6 +93,8 @@ pub mod stop_cause {
             TORQUE => "torque-limit",
             GRASP => "grasp-lost",
             STALE => "input-stale",
+            SLIP => "grasp-slip",
+            TOO_FEW_HANDS => "too-few-hands",
             _ => "unknown",
         }
     }
@@ -274,6 +281,12 @@ payload! {
         pub next_state_tick: [u64; MAX_ROBOTS],
         /// Where each robot's own world lies in the team's, by the object that all hold.
         pub odometry_pose: [PoseWire; MAX_ROBOTS],
+        /// How far each hand has parted from its grip, in hand order: it slips from 1 on.
+        pub hand_slip: [f64; MAX_HANDS_OF_TEAM],
+        /// Bit i: hand i of the team, in hand order, has lost the object and takes no part any more.
+        pub absent_hands: u64,
+        /// Why the last of them was lost: one of [`stop_cause`], 0 if none was.
+        pub loss_cause: u64,
     }
 }
 
@@ -334,3 +347,4 @@ payload! {
 
 const _: () = assert!(MAX_JOINTS <= 64, "joint sets travel as 64-bit masks");
 const _: () = assert!(MAX_ROBOTS * MAX_HANDS == MAX_HANDS_OF_TEAM);
+const _: () = assert!(MAX_HANDS_OF_TEAM <= 64, "sets of hands travel as 64-bit masks");

@@ -83,8 +83,8 @@ fn sizes_follow_from_the_limits() {
     );
     assert_eq!(
         size_of::<TeamState>(),
-        word * (2 * 6 * MAX_HANDS_OF_TEAM + 2 * 7 + 6 + 1 + 4 + 1 + 3 + (1 + 7) * MAX_ROBOTS),
-        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, tick and frame by robot"
+        word * ((2 * 6 + 1) * MAX_HANDS_OF_TEAM + 2 * 7 + 6 + 1 + 4 + 1 + 3 + (1 + 7) * MAX_ROBOTS + 2),
+        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, tick and frame by robot, slip by hand, lost hands and why"
     );
     assert_eq!(
         size_of::<ObjectTruth>(),

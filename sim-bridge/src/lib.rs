@@ -16,6 +16,7 @@
 
 mod coast;
 mod error;
+mod failures;
 mod grasp;
 mod grip;
 mod layout;

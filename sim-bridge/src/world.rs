@@ -1,5 +1,6 @@
 //! The world of a run, tick by tick.
 
+use crate::failures::GraspFailures;
 use crate::grasp::{self, GraspSite, Spring};
 use crate::grip;
 use crate::layout::Layout;
@@ -26,6 +27,7 @@ pub struct World {
     data: MjData<Box<MjModel>>,
     layout: Layout,
     spring: Option<Spring>,
+    failures: GraspFailures,
     noise: Vec<Option<Noise>>,
     substeps: u64,
     /// Readings that are kept for each robot: the delay in ticks, plus one.
@@ -152,8 +154,11 @@ impl World {
             simulator_state: vec![0.0; state_size].into(),
         };
         let fingerprint = xxh3_64(format!("{} {xml}", mujoco_rs::mujoco_version()).as_bytes());
-        let mut world = Self { data, layout, spring, noise, substeps, depth, fingerprint, state, scratch };
+        let failures = GraspFailures::default();
+        let mut world =
+            Self { data, layout, spring, failures, noise, substeps, depth, fingerprint, state, scratch };
         world.settle(scenario.physics.step_s)?;
+        world.failures = GraspFailures::of(run);
         // Readings from before tick 0 are those of tick 0.
         for ring in world.state.readings.chunks_exact_mut(depth) {
             let first = ring[0];
@@ -225,12 +230,14 @@ impl World {
         if !values.into_iter().all(|value| value.is_finite()) {
             return Err(StepWorldError::NotFinite);
         }
-        grip::close_and_open(&mut self.data, &self.layout, commands, &mut self.state.holding);
+        let State { tick, holding, .. } = &mut self.state;
+        grip::close_and_open(&mut self.data, &self.layout, commands, holding);
+        self.failures.undo(*tick, &mut self.data, &self.layout, holding);
         self.scratch.tallies.fill(Tally::empty());
         self.scratch.contacts = Contacts::default();
         for substep in 1..=self.substeps {
             self.set_drives(commands, substep as f64 / self.substeps as f64);
-            self.pull_by_springs();
+            self.pull();
             for (tally, layout) in self.scratch.tallies.iter_mut().zip(&self.layout.robots) {
                 tally.count_demands(&self.data, layout);
             }
@@ -328,16 +335,24 @@ impl World {
         }
     }
 
-    /// Sets the grasp springs' forces for the step to come.
-    fn pull_by_springs(&mut self) {
-        let Some(spring) = self.spring else { return };
+    /// Sets, for the step to come, the forces of grasps that are no welds: springs, and what slips.
+    fn pull(&mut self) {
+        let tick = self.state.tick;
+        if self.spring.is_none() && !self.failures.have_begun(tick) {
+            return;
+        }
         let object = self.layout.object.body;
         self.data.xfrc_applied_mut()[object] = [0.0; 6];
         let robots = self.layout.robots.iter().zip(&self.state.holding);
-        for ((layout, holding), wrenches) in robots.zip(&mut self.scratch.hand_wrenches) {
+        let robots = robots.zip(&mut self.scratch.hand_wrenches).enumerate();
+        for (robot, ((layout, holding), wrenches)) in robots {
             for (index, (hand, wrench)) in layout.hands.iter().zip(wrenches).enumerate() {
-                let holds = holding & 1 << index != 0;
-                *wrench = if holds { spring.wrench_on_object(&self.data, hand) } else { Wrench::zero() };
+                *wrench = match (self.failures.of_hand(tick, robot, index), self.spring) {
+                    _ if holding & 1 << index == 0 => Wrench::zero(),
+                    (Some(lost), _) => lost.wrench_on_object(&self.data, hand),
+                    (None, Some(spring)) => spring.wrench_on_object(&self.data, hand),
+                    (None, None) => Wrench::zero(),
+                };
                 let palm = Vector3::from(self.data.site_xpos()[hand.palm_site]);
                 // The simulator wants forces at centres of mass.
                 let at_com = |body: usize, wrench: &Wrench<mikoshi_spatial::World>| {
@@ -353,13 +368,17 @@ impl World {
         }
     }
 
-    /// Takes the welds' wrenches while the last step's constraint forces stand; springs' are known.
+    /// Takes the welds' wrenches while the last step's constraint forces stand; all others are known.
     fn read_hand_wrenches(&mut self) {
         if self.spring.is_some() {
             return;
         }
-        for (layout, wrenches) in self.layout.robots.iter().zip(&mut self.scratch.hand_wrenches) {
-            for (hand, wrench) in layout.hands.iter().zip(wrenches) {
+        let (tick, robots) = (self.state.tick, self.layout.robots.iter());
+        for (robot, (layout, wrenches)) in robots.zip(&mut self.scratch.hand_wrenches).enumerate() {
+            for (index, (hand, wrench)) in layout.hands.iter().zip(wrenches).enumerate() {
+                if self.failures.of_hand(tick, robot, index).is_some() {
+                    continue;
+                }
                 // SAFETY: called between the halves of a step, or after a forward pass.
                 *wrench = unsafe { truth::weld_wrench(&self.data, &self.layout.object, hand) };
             }

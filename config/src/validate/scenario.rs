@@ -2,7 +2,7 @@
 
 use super::checks::{Checks, Violation};
 use crate::robot::RobotConfig;
-use crate::scenario::{Control, Grasp, InternalForces, Job, Member, Motion, Policy, Scenario};
+use crate::scenario::{Control, Grasp, InternalForces, Job, LostGrasp, Member, Motion, Policy, Scenario};
 use mikoshi_ipc_types::{MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS};
 use std::collections::BTreeSet;
 
@@ -74,6 +74,7 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     safety(&mut checks, scenario);
     checks.not_negative("physics.friction", scenario.physics.friction);
     world(&mut checks, scenario);
+    grasp_failures(&mut checks, scenario, configs);
     let sensors = &scenario.sensors;
     checks.not_negative("sensors.force_noise_n", sensors.force_noise_n);
     checks.not_negative("sensors.moment_noise_nm", sensors.moment_noise_nm);
@@ -101,6 +102,17 @@ fn safety(checks: &mut Checks, scenario: &Scenario) {
     checks.positive("safety.torque_limit_s", safety.torque_limit_s);
     let stale_limit = safety.stale_limit_ticks;
     checks.require(stale_limit > 0, "safety.stale_limit_ticks", stale_limit, "at least 1");
+    checks.positive("safety.slip_m", safety.slip_m);
+    checks.positive("safety.slip_rad", safety.slip_rad);
+    checks.require(safety.slip_ticks > 0, "safety.slip_ticks", safety.slip_ticks, "at least 1");
+    if safety.lost_grasp == LostGrasp::CarryOn {
+        let key = "safety.lost_grasp";
+        let is_tree = scenario.hybrid.internal_forces == InternalForces::BalancedTree;
+        let expected = "stop: internal forces that are no balanced tree are not formed anew";
+        checks.require(is_tree, key, "carry-on", expected);
+        let is_by_symmetry = scenario.coordination.policy == Policy::Symmetry;
+        checks.require(is_by_symmetry, key, "carry-on", "stop: a leader does not share what it carries");
+    }
     for (index, event) in safety.operator.iter().enumerate() {
         checks.not_negative(format_args!("safety.operator.{index}.at_s"), event.at_s);
     }
@@ -120,6 +132,34 @@ fn world(checks: &mut Checks, scenario: &Scenario) {
         if let Some(friction) = fixed.friction {
             checks.not_negative(format_args!("{key}.friction"), friction);
         }
+    }
+}
+
+fn grasp_failures(checks: &mut Checks, scenario: &Scenario, configs: &[&RobotConfig]) {
+    let members = || scenario.robots.iter().zip(configs);
+    for (index, failure) in scenario.world.grasp_failures.iter().enumerate() {
+        let key = format!("world.grasp_failures.{index}");
+        checks.not_negative(format_args!("{key}.at_s"), failure.at_s);
+        checks.positive(format_args!("{key}.friction_n"), failure.friction_n);
+        let ratio = failure.damping_ratio(scenario.physics.step_s, scenario.object.mass_kg);
+        let expected = "less, or a shorter physics step: the object would shake";
+        checks.require(
+            ratio.is_nan() || ratio < 0.5,
+            format_args!("{key}.friction_n"),
+            failure.friction_n,
+            expected,
+        );
+        let Some((member, config)) = members().find(|(member, _)| member.name == failure.robot) else {
+            let names: Vec<_> = members().map(|(member, _)| member.name.as_str()).collect();
+            let expected = format!("a robot of the team: {}", names.join(", "));
+            checks.require(false, format_args!("{key}.robot"), format_args!("{:?}", failure.robot), expected);
+            continue;
+        };
+        let grasping = grasping_hands(member, config).unwrap_or_default();
+        let names: Vec<_> = grasping.iter().map(|&hand| config.hands[hand].name.as_str()).collect();
+        let expected = format!("a hand with which {} grasps: {}", member.name, names.join(", "));
+        let is_known = names.contains(&failure.hand.as_str());
+        checks.require(is_known, format_args!("{key}.hand"), format_args!("{:?}", failure.hand), expected);
     }
 }
 

@@ -90,6 +90,7 @@ mod hybrid;
 mod internal_forces;
 mod landmark;
 mod linear;
+mod parting;
 mod selection;
 mod team_arms;
 mod torque;
@@ -100,14 +101,16 @@ pub use gain_bound::{RECOMMENDED_SHARE, critical_loop_gain};
 pub use generalized::{Generalized, GeneralizedForce, GeneralizedPosition, GeneralizedVelocity};
 pub use hybrid::{
     BuildHybridLawError, ForceGains, HandInput, HandReference, HandStiffness, HybridError, HybridInputs,
-    HybridLaw, HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, StartHybridError,
+    HybridLaw, HybridOutput, HybridParameters, HybridReference, HybridScratch, HybridState, ReformError,
+    StartHybridError,
 };
 pub use internal_forces::{
-    BuildInternalForcesError, InternalForces, OBJECT_ROW, RowCombination, change_of_representation,
-    pair_matrix, pairwise_forces,
+    BuildInternalForcesError, FormError, Formation, FormedForces, InternalForces, OBJECT_ROW, RowCombination,
+    change_of_representation, pair_matrix, pairwise_forces,
 };
 pub use landmark::{BuildLandmarkError, FrameCorrection, Landmark, LandmarkParameters, Sighting};
 pub use linear::Linear;
+pub use parting::{Gap, Parting, PartingLimits};
 pub use selection::{Axis, Control, Selection};
 pub use team_arms::{BuildTeamArmsError, RobotArms, TeamArms};
 pub use torque::{joint_torques, tip_wrenches};

@@ -16,7 +16,7 @@ pub fn tip_wrenches(
     let rows: Vec<_> = core::iter::once(h.external).chain(internal).collect();
     let mut tips = vec![Wrench::zero(); internal_forces.arms()];
     let mut work = vec![Wrench::zero(); internal_forces.work_len()];
-    internal_forces.tip_forces(&rows, &mut tips, &mut work);
+    internal_forces.of_all().tip_forces(&rows, &mut tips, &mut work);
     tips
 }
 

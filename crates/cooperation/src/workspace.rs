@@ -1,6 +1,8 @@
 //! From hands to the generalized vectors h, z and u (sections 2.1 and 2.4).
 
-use crate::{GeneralizedForce, GeneralizedPosition, GeneralizedVelocity, InternalForces, VirtualStick};
+use crate::{
+    FormedForces, GeneralizedForce, GeneralizedPosition, GeneralizedVelocity, InternalForces, VirtualStick,
+};
 use mikoshi_spatial::{CoordinateFrame, Hand, Object, Pose, Tip, Twist, World, Wrench, exp, log};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
@@ -50,10 +52,10 @@ impl WorkspaceScratch {
     }
 
     /// h and z (eqs. 11, 27 to 29) of n hands, each with its virtual stick, its pose, and the wrench that it
-    /// applies to the object, at its origin in world axes.
+    /// applies to the object, at its origin in world axes. What a hand says that takes no part changes nothing.
     pub fn evaluate(
         &mut self,
-        internal_forces: &InternalForces,
+        internal_forces: &FormedForces<'_>,
         hands: impl Iterator<Item = (VirtualStick, Pose<World, Hand>, Wrench<World>)>,
         h: &mut GeneralizedForce,
         z: &mut GeneralizedPosition,
@@ -66,7 +68,7 @@ impl WorkspaceScratch {
         }
 
         // Eq. 27, row 0. What the tips deviate from it is left in `tip_twists`.
-        let X_WA = mean_pose(internal_forces.w_inverse(), &self.tips, &mut self.tip_twists);
+        let X_WA = mean_pose(internal_forces.formation().w_inverse(), &self.tips, &mut self.tip_twists);
         let X_AW = X_WA.inverse();
         z.external = X_WA;
 
@@ -101,7 +103,7 @@ pub fn generalized_velocity(
     scratch: &mut WorkspaceScratch,
 ) {
     let WorkspaceScratch { row_twists, work_twists, .. } = scratch;
-    internal_forces.generalized_position(tip_twists, row_twists, work_twists);
+    internal_forces.of_all().generalized_position(tip_twists, row_twists, work_twists);
     let X_AW = X_WA.inverse();
     u.external = row_twists.first().copied().unwrap_or_default();
     for (internal, row) in u.internal.iter_mut().zip(row_twists.iter().skip(1)) {
@@ -119,7 +121,7 @@ pub(crate) fn nan_pose<A: CoordinateFrame, B: CoordinateFrame>() -> Pose<A, B> {
 ///
 /// The mean attitude R solves `Σ wᵢ log(Rᵢ Rᵀ) = 0`: eq. 27 with rotation vectors about R. (Deviation:
 /// the paper averages Euler angles.)
-fn mean_pose(
+pub(crate) fn mean_pose(
     weights: &[f64],
     tips: &[Pose<World, Tip>],
     deviations: &mut [Twist<World>],

@@ -71,13 +71,13 @@ proptest! {
         let mut work = vec![f64::NAN; forces.work_len()];
         let mut out = vec![f64::NAN; n];
         let (w_and_c, u, x_column) = (forces.w_and_c(), forces.u(), column(x));
-        forces.generalized_force(x, &mut out, &mut work);
+        forces.of_all().generalized_force(x, &mut out, &mut work);
         prop_assert!(is_close(&column(&out), &(&w_and_c * &x_column)));
-        forces.tip_forces(x, &mut out, &mut work);
+        forces.of_all().tip_forces(x, &mut out, &mut work);
         prop_assert!(is_close(&column(&out), &(&u * &x_column)));
-        forces.generalized_position(x, &mut out, &mut work);
+        forces.of_all().generalized_position(x, &mut out, &mut work);
         prop_assert!(is_close(&column(&out), &(u.transpose() * &x_column)));
-        forces.tip_displacements(x, &mut out, &mut work);
+        forces.of_all().tip_displacements(x, &mut out, &mut work);
         prop_assert!(is_close(&column(&out), &(w_and_c.transpose() * &x_column)));
     }
 
@@ -89,8 +89,8 @@ proptest! {
     ) {
         let n = forces.arms();
         let (mut h, mut dy, mut work) = (vec![0.0; n], vec![0.0; n], vec![0.0; forces.work_len()]);
-        forces.generalized_force(&q[..n], &mut h, &mut work);
-        forces.tip_displacements(&dz[..n], &mut dy, &mut work);
+        forces.of_all().generalized_force(&q[..n], &mut h, &mut work);
+        forces.of_all().tip_displacements(&dz[..n], &mut dy, &mut work);
         let work_of = |forces: &[f64], displacements: &[f64]| -> f64 {
             forces.iter().zip(displacements).map(|(f, d)| f * d).sum()
         };
@@ -115,7 +115,7 @@ proptest! {
             let n = forces.arms();
             let rows: Vec<f64> = core::iter::once(0.0).chain(dz.iter().copied()).take(n).collect();
             let (mut dy, mut work) = (vec![0.0; n], vec![0.0; forces.work_len()]);
-            forces.tip_displacements(&rows, &mut dy, &mut work);
+            forces.of_all().tip_displacements(&rows, &mut dy, &mut work);
             prop_assert!((dy.iter().sum::<f64>() / n as f64).abs() < 1e-12);
         }
     }
@@ -183,9 +183,9 @@ fn a_thousand_robots_are_inverted_by_their_tree() {
     let n = forces.arms();
     let q: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
     let (mut h, mut back, mut work) = (vec![0.0; n], vec![0.0; n], vec![0.0; forces.work_len()]);
-    forces.generalized_force(&q, &mut h, &mut work);
+    forces.of_all().generalized_force(&q, &mut h, &mut work);
     assert!((h[0] - q.iter().sum::<f64>()).abs() < 1e-10);
-    forces.tip_forces(&h, &mut back, &mut work);
+    forces.of_all().tip_forces(&h, &mut back, &mut work);
     assert!(q.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 

@@ -114,7 +114,7 @@ fn relative_positions_of_four_robots_are_those_of_eq_46() {
     let tips: Vec<f64> = (1..=8).map(|i| f64::from(1 << i)).collect();
     let [p1, p2, p3, p4, p5, p6, p7, p8] = tips[..] else { unreachable!() };
     let (mut z, mut work) = (vec![0.0; 8], vec![0.0; tree.work_len()]);
-    tree.generalized_position(&tips, &mut z, &mut work);
+    tree.of_all().generalized_position(&tips, &mut z, &mut work);
     let expected = [
         (p1 + p2 + p3 + p4 + p5 + p6 + p7 + p8) / 8.0,
         (p1 + p2 + p3 + p4 - p5 - p6 - p7 - p8) / 4.0,

@@ -70,7 +70,7 @@ impl Grasp {
         scratch.poison();
         let hands = self.sticks.iter().zip(&self.hands).zip(&self.wrenches);
         let hands = hands.map(|((stick, X_WH), f_H)| (*stick, *X_WH, *f_H));
-        scratch.evaluate(&self.internal_forces, hands, &mut h, &mut z);
+        scratch.evaluate(&self.internal_forces.of_all(), hands, &mut h, &mut z);
         (h, z)
     }
 }
@@ -217,7 +217,7 @@ fn the_mean_of_two_attitudes_is_half_way_between_them() {
     let mut h = GeneralizedForce::zero(2);
     let mut z = GeneralizedPosition::at_grasp(Pose::identity(), 2);
     let each = hands.iter().map(|X_WH| (stick, *X_WH, Wrench::zero()));
-    WorkspaceScratch::new(&internal_forces).evaluate(&internal_forces, each, &mut h, &mut z);
+    WorkspaceScratch::new(&internal_forces).evaluate(&internal_forces.of_all(), each, &mut h, &mut z);
     let half_way = exp(&(apart * 0.5)) * first;
     assert!(log(&(z.external.rotation * half_way.inverse())).norm() < 1e-13);
     assert!((z.external.translation - Vector3::x() * 0.5).norm() < 1e-15);

@@ -83,6 +83,22 @@ pub struct ObjectTracker {
     sticks: Vec<VirtualStick>,
 }
 
+/// A row of C when some hands take no part any more, a set in hand order. Only rows of a tree lose hands: between what is
+/// left of their two groups they are `|L||R|/(|L|+|R|) · (mean of L − mean of R)`, and zero where one is empty.
+fn among_those_left(coefficients: &[f64], absent: u64) -> impl Iterator<Item = f64> {
+    let is_left = move |hand: usize| absent >> hand & 1 == 0;
+    let count = |is_of: fn(f64) -> bool| {
+        coefficients.iter().enumerate().filter(|(hand, c)| is_left(*hand) && is_of(**c)).count() as f64
+    };
+    let (left, right) = (count(|c| c > 0.0), count(|c| c < 0.0));
+    coefficients.iter().enumerate().map(move |(hand, &c)| match (absent, c) {
+        (0, _) => c,
+        _ if !is_left(hand) || c == 0.0 || left * right == 0.0 => 0.0,
+        (_, 0.0..) => right / (left + right),
+        _ => -left / (left + right),
+    })
+}
+
 /// The object in one tick.
 #[derive(Clone, Debug)]
 pub struct TrackedObject {
@@ -136,8 +152,10 @@ impl ObjectTracker {
         observation: &Observation,
     ) -> Vec<Wrench<Object>> {
         let tips = self.tip_wrenches(X_WA, is_hybrid, observation);
+        let absent = observation.team_state.payload.absent_hands;
         let row = |coefficients: &Vec<f64>| {
-            let force_W = tips.iter().zip(coefficients).fold(Wrench::zero(), |sum, (tip, c)| sum + *tip * *c);
+            let left = among_those_left(coefficients, absent);
+            let force_W = tips.iter().zip(left).fold(Wrench::zero(), |sum, (tip, c)| sum + *tip * c);
             force_W.expressed_in(&X_WA.inverse())
         };
         self.c.iter().map(row).collect()

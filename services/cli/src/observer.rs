@@ -243,20 +243,49 @@ impl RunObserver {
     }
 }
 
-/// Why and when the team stopped for safety's sake.
+/// Why and when the team stopped for safety's sake, and whose hands it has lost.
 struct Stops {
     robots: Vec<String>,
+    /// Robot and name of each hand, in hand order.
+    hands: Vec<(String, String)>,
     cause: u64,
+    absent_hands: u64,
     faults: Vec<Fault>,
 }
 
 impl Stops {
     fn of(run: &RunSpec) -> Self {
         let robots = run.robots.iter().map(|robot| robot.member.name.clone()).collect();
-        Self { robots, cause: 0, faults: vec![] }
+        let hands = run.robots.iter().flat_map(|robot| {
+            let name = |&hand: &usize| (robot.member.name.clone(), robot.config.hands[hand].name.clone());
+            robot.grasping_hands.iter().map(name)
+        });
+        Self { robots, hands: hands.collect(), cause: 0, absent_hands: 0, faults: vec![] }
     }
 
     fn observe(&mut self, tick: u64, team: &TeamState) {
+        self.observe_hands(tick, team);
+        self.observe_stop(tick, team);
+    }
+
+    fn observe_hands(&mut self, tick: u64, team: &TeamState) {
+        let lost = team.absent_hands & !core::mem::replace(&mut self.absent_hands, team.absent_hands);
+        let left = self.hands.len() as u32 - team.absent_hands.count_ones();
+        let code = stop_cause::name(team.loss_cause);
+        for (_, (robot, hand)) in self.hands.iter().enumerate().filter(|(index, _)| lost >> index & 1 != 0) {
+            let text = format!(
+                "{robot}'s {hand} hand lost the object in tick {tick}: {code}, {left} hands are left"
+            );
+            print_error(&as_lines("warning", &text));
+            // A team that stops for it says so itself.
+            if team.stop_cause == 0 {
+                let (service, robot) = ("coordinator".to_owned(), Some(robot.clone()));
+                self.faults.push(Fault { tick, service, robot, code: code.to_owned() });
+            }
+        }
+    }
+
+    fn observe_stop(&mut self, tick: u64, team: &TeamState) {
         if core::mem::replace(&mut self.cause, team.stop_cause) == team.stop_cause || team.stop_cause == 0 {
             return;
         }

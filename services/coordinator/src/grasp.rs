@@ -19,18 +19,27 @@ impl GraspCompliance {
     /// As the scenario has it calibrated; none if it hasn't.
     pub(crate) fn new(scenario: &Scenario) -> Self {
         let hybrid = &scenario.hybrid;
+        Self::of_stiffness(scenario, hybrid.grasp_stiffness_n_m, hybrid.grasp_stiffness_nm_rad)
+    }
+
+    /// The same; where nobody has calibrated it, as if all that yields were the grasp.
+    pub(crate) fn at_least_of_a_hand(scenario: &Scenario) -> Self {
+        let hybrid = &scenario.hybrid;
+        let n_m = hybrid.grasp_stiffness_n_m.unwrap_or(hybrid.hand_stiffness_n_m);
+        let nm_rad = hybrid.grasp_stiffness_nm_rad.unwrap_or(hybrid.hand_stiffness_nm_rad);
+        Self::of_stiffness(scenario, Some(n_m), Some(nm_rad))
+    }
+
+    fn of_stiffness(scenario: &Scenario, n_m: Option<f64>, nm_rad: Option<f64>) -> Self {
+        let hybrid = &scenario.hybrid;
         let inverse = |stiffness: Option<f64>| stiffness.map_or(0.0, f64::recip);
         let filter_rad = core::f64::consts::TAU * hybrid.filter_hz * scenario.control_period_s;
-        Self {
-            m_n: inverse(hybrid.grasp_stiffness_n_m),
-            rad_nm: inverse(hybrid.grasp_stiffness_nm_rad),
-            filter_pole: (-filter_rad).exp(),
-        }
+        Self { m_n: inverse(n_m), rad_nm: inverse(nm_rad), filter_pole: (-filter_rad).exp() }
     }
 
     /// How far the object is from the mean of the sticks' tips (eq. 27), by the hands' filtered wrenches,
     /// which go one tick on. `shares` are the tips' weights in that mean, and in what they bear of the
-    /// external wrench (W⁻).
+    /// external wrench (W⁻); hands without a share take no part.
     ///
     /// Unless the object `is_free`, only the internal part of the wrenches counts. An object that something
     /// holds, a wall that it is pressed against or what it rests on, would else seem not to follow its hands
@@ -43,11 +52,11 @@ impl GraspCompliance {
         is_free: bool,
     ) -> Twist<World> {
         let mut held = Wrench::zero();
-        for (filtered, (hand, stick)) in filtered.iter_mut().zip(hands.clone()) {
+        for ((filtered, share), (hand, stick)) in filtered.iter_mut().zip(shares).zip(hands.clone()) {
             for (filtered, wrench) in filtered.iter_mut().zip(hand.wrench.to_array()) {
                 *filtered = wrench + self.filter_pole * (*filtered - wrench);
             }
-            if !is_free {
+            if !is_free && *share != 0.0 {
                 held += stick.tip_wrench(&hand.pose, &Wrench::from_array(filtered));
             }
         }
@@ -67,8 +76,12 @@ impl GraspCompliance {
         stick: &VirtualStick,
         wrench: &Wrench<World>,
     ) -> Twist<World> {
-        let grip = -Twist::new(wrench.force * self.m_n, wrench.moment * self.rad_nm);
-        grip.shifted(&stick.vector(X_WH))
+        self.grip_yield(wrench).shifted(&stick.vector(X_WH))
+    }
+
+    /// How far the object is displaced in a hand's grip.
+    pub(crate) fn grip_yield(&self, wrench: &Wrench<World>) -> Twist<World> {
+        -Twist::new(wrench.force * self.m_n, wrench.moment * self.rad_nm)
     }
 }
 

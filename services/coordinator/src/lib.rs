@@ -9,6 +9,7 @@
 
 mod build;
 mod grasp;
+mod grips;
 mod job;
 mod leading;
 mod object_motion;

@@ -124,9 +124,16 @@ impl OdometryFrames {
         let sightings = sightings.get(..seen.hands_of_robots.len())?;
         let mut references = hybrid.hand_pose_ref.iter_mut();
         let robots = state.frames.iter_mut().zip(seen.hands_of_robots);
-        for ((frame, &count), correction) in robots.zip(landmark.corrections(sightings)) {
+        let corrections = landmark.corrections(sightings).zip(sightings);
+        for ((frame, &count), (correction, sighting)) in robots.zip(corrections) {
+            let references = references.by_ref().take(count);
+            // Whoever doesn't hold the object sees nothing.
+            if sighting.weight == 0.0 {
+                references.for_each(drop);
+                continue;
+            }
             *frame = frame.corrected(&correction);
-            for array in references.by_ref().take(count) {
+            for array in references {
                 // Where they are none the law says so in the next tick.
                 if let Some(X_WH) = Pose::<World, Hand>::from_array(array) {
                     *array = (correction.motion() * X_WH).to_array();
@@ -161,8 +168,9 @@ impl Seen<'_> {
         arms: core::ops::Range<usize>,
     ) -> Option<Sighting> {
         let (mut weight, mut tips, mut deviation) = (0.0, Vector3::zeros(), Twist::zero());
-        let each = 1.0 / arms.len() as f64;
-        for arm in arms {
+        let holding = || arms.clone().filter(|&arm| hybrid.takes_part(arm));
+        let each = 1.0 / holding().count().max(1) as f64;
+        for arm in holding() {
             let (stick, hand) = (hybrid.stick(arm)?, self.hands.get(arm)?);
             let wrench = Wrench::from_array(self.hand_wrench.get(arm)?);
             let X_WB = stick.tip_pose(&hand.pose);

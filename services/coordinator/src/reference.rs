@@ -41,28 +41,38 @@ impl References {
         Ok(Self { rows, ramp_ticks: RAMP_S / scenario.control_period_s })
     }
 
-    /// Fills in h_r and z_r for an object that shall be at `X_WA_ref`, `ticks` ticks after control started
-    /// with the generalized force at `force_start`: from there forces go to what is asked for, and axes
-    /// that are displaced go there from where they are.
+    /// Fills in h_r and z_r for an object that shall be at `X_WA_ref`, so many ticks after control started, and after it
+    /// was last formed for the hands that take part, with the generalized force at `force_start` and the object's
+    /// reference off by `off_start`: from there forces and object go to what is asked for, and axes that are displaced
+    /// go there from where they are.
     pub(crate) fn fill(
         &self,
-        ticks: u64,
+        [ticks, formed_ticks]: [u64; 2],
         X_WA_ref: &Pose<World, Object>,
-        force_start: &[[f64; 6]],
+        (force_start, off_start): (&[[f64; 6]], &[f64; 6]),
         force: &mut GeneralizedForce,
         position: &mut GeneralizedPosition,
     ) {
         let share = smooth_step(ticks as f64 / self.ramp_ticks);
+        let force_share = smooth_step(formed_ticks as f64 / self.ramp_ticks);
         let mut rows = self.rows.iter().zip(force_start);
         if let Some((object, start)) = rows.next() {
-            force.external = between(start, &object.force, share);
-            position.external = X_WA_ref.displaced(&Twist::from_vector(&(object.position * share)));
+            force.external = between(start, &object.force, force_share);
+            let off = self.off_after(formed_ticks, off_start);
+            position.external = X_WA_ref.displaced(&(Twist::from_vector(&(object.position * share)) + off));
         }
         let outputs = force.internal.iter_mut().zip(position.internal.iter_mut());
         for ((row, start), (force, position)) in rows.zip(outputs) {
-            *force = between(start, &row.force, share);
+            *force = between(start, &row.force, force_share);
             *position = Twist::from_vector(&(row.position * share));
         }
+    }
+}
+
+impl References {
+    /// How far the object's reference is still off, so many ticks after it was off by `off_start`.
+    pub(crate) fn off_after(&self, ticks: u64, off_start: &[f64; 6]) -> Twist<World> {
+        Twist::from_array(off_start) * (1.0 - smooth_step(ticks as f64 / self.ramp_ticks))
     }
 }
 

@@ -14,7 +14,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::scenario::{OperatorWord, Safety as SafetyConfig, Scenario};
-use mikoshi_ipc_types::{MAX_ROBOTS, PoseWire, RobotState, all_hands, flag, operator, stop_cause};
+use mikoshi_ipc_types::{MAX_ROBOTS, PoseWire, RobotState, flag, operator, stop_cause};
 use mikoshi_spatial::{Hand, Pose, World};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -31,15 +31,6 @@ pub(crate) struct Safety {
     script: Vec<(u64, u64)>,
 }
 
-/// What the coordinator knows of the team beside what robots say.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SeenTeam {
-    /// Hands shall hold the object.
-    pub shall_hold: bool,
-    /// Nobody steps.
-    pub stands: bool,
-}
-
 /// What is remembered between ticks.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +41,8 @@ pub(crate) struct SafetyState {
     pub robot: u64,
     /// The operator's last word.
     pub operator_word: u64,
+    /// Not 0 where the team is stopped and its hands' wrenches mean nothing to it any more.
+    blind: u64,
     /// For how many ticks each cause has been there, by robot.
     lasted: [[u64; CAUSES]; MAX_ROBOTS],
 }
@@ -64,7 +57,7 @@ unsafe impl Pod for SafetyState {}
 
 impl Default for SafetyState {
     fn default() -> Self {
-        Self { cause: 0, robot: 0, operator_word: 0, lasted: [[0; CAUSES]; MAX_ROBOTS] }
+        Self { cause: 0, robot: 0, operator_word: 0, blind: 0, lasted: [[0; CAUSES]; MAX_ROBOTS] }
     }
 }
 
@@ -76,7 +69,16 @@ impl SafetyState {
 
     /// Whether it is because what is measured can't be believed: then nothing may be controlled by it.
     pub(crate) fn is_blind(&self) -> bool {
-        matches!(self.cause, stop_cause::INPUT | stop_cause::STALE)
+        self.blind != 0 || matches!(self.cause, stop_cause::INPUT | stop_cause::STALE)
+    }
+
+    /// Stops a team that has lost a hand of this robot; `is_blind` if it can't go on without that hand. What
+    /// stopped it before stays.
+    pub(crate) fn stop(&mut self, cause: u64, robot: usize, is_blind: bool) {
+        if !self.is_stopped() {
+            (self.cause, self.robot) = (cause, robot as u64 + 1);
+        }
+        self.blind |= u64::from(is_blind);
     }
 }
 
@@ -96,22 +98,20 @@ impl Safety {
         }
     }
 
-    /// One tick: what robots say of themselves, each with the number of its grasping hands; what is known of the
-    /// team; and what the operator has said last.
+    /// One tick: what robots say of themselves, each with the set of its hands that take part; whether
+    /// nobody steps; and what the operator has said last.
     pub(crate) fn look<'a>(
         &self,
         state: &mut SafetyState,
         tick: u64,
-        robots: impl Iterator<Item = (&'a RobotState, usize)>,
-        seen: SeenTeam,
+        robots: impl Iterator<Item = (&'a RobotState, u64)>,
+        stands: bool,
         operator_word: u64,
     ) {
-        let SeenTeam { shall_hold, stands } = seen;
         let mut first = None;
         for (index, ((robot, hands), lasted)) in robots.zip(&mut state.lasted).enumerate() {
             for (cause, ticks) in stop_cause::ALL.into_iter().zip(lasted) {
-                *ticks =
-                    if self.is_wrong(cause, robot, hands, shall_hold) { ticks.saturating_add(1) } else { 0 };
+                *ticks = if self.is_wrong(cause, robot, hands) { ticks.saturating_add(1) } else { 0 };
                 let patience = match cause {
                     stop_cause::TORQUE => self.torque_ticks,
                     stop_cause::STALE => self.limits.stale_limit_ticks,
@@ -132,26 +132,27 @@ impl Safety {
         match first {
             Some((cause, robot)) if !state.is_stopped() => (state.cause, state.robot) = (cause, robot),
             None if stands && says.any(|command| command == operator::RESUME) => {
-                (state.cause, state.robot) = (0, 0);
+                (state.cause, state.robot, state.blind) = (0, 0, 0);
             }
             _ => {}
         }
     }
 
-    fn is_wrong(&self, cause: u64, robot: &RobotState, hands: usize, shall_hold: bool) -> bool {
+    fn is_wrong(&self, cause: u64, robot: &RobotState, hands: u64) -> bool {
         let limits = &self.limits;
         match cause {
             stop_cause::INPUT => robot.flags & flag::INPUT_REJECTED != 0,
-            stop_cause::HAND_WRENCH => robot.hand_wrench.iter().take(hands).any(|wrench| {
+            stop_cause::HAND_WRENCH => robot.hand_wrench.iter().enumerate().any(|(hand, wrench)| {
                 let [fx, fy, fz, nx, ny, nz] = *wrench;
-                Vector3::new(fx, fy, fz).norm() > limits.hand_force_max_n
-                    || Vector3::new(nx, ny, nz).norm() > limits.hand_moment_max_nm
+                let is_too_much = Vector3::new(fx, fy, fz).norm() > limits.hand_force_max_n
+                    || Vector3::new(nx, ny, nz).norm() > limits.hand_moment_max_nm;
+                is_too_much && hands & 1 << hand != 0
             }),
             stop_cause::BALANCE => robot.zmp_margin_m < limits.zmp_margin_min_m,
             stop_cause::TILT => tilt(robot) > limits.tilt_max_rad,
             stop_cause::TORQUE => robot.flags & flag::TORQUE_LIMIT != 0,
-            stop_cause::GRASP => shall_hold && robot.holding_hands != all_hands(hands),
             stop_cause::STALE => robot.flags & flag::INPUT_MISSING != 0,
+            // Hands that are lost are found in `grips.rs`.
             _ => false,
         }
     }
@@ -200,8 +201,6 @@ mod tests {
         Safety { limits, torque_ticks: 100, script: vec![(50, operator::STOP), (60, operator::RESUME)] }
     }
 
-    const STANDING: SeenTeam = SeenTeam { shall_hold: true, stands: true };
-
     fn well() -> RobotState {
         RobotState {
             base_pose: [0.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0],
@@ -220,7 +219,7 @@ mod tests {
                 spoil(&mut robots[1]);
             }
             // Past what the script says.
-            safety.look(&mut state, 1000 + tick, robots.iter().map(|robot| (robot, 2)), STANDING, 0);
+            safety.look(&mut state, 1000 + tick, robots.iter().map(|robot| (robot, 0b11)), true, 0);
             state.is_stopped().then_some((tick, state.cause, state.robot))
         })
     }
@@ -233,13 +232,12 @@ mod tests {
     #[test]
     fn whatever_is_wrong_stops_the_team_within_twenty_ticks_and_is_named() {
         type Spoil = fn(&mut RobotState);
-        let spoils: [(u64, Spoil); 6] = [
+        let spoils: [(u64, Spoil); 5] = [
             (stop_cause::INPUT, |robot| robot.flags |= flag::INPUT_REJECTED),
             (stop_cause::HAND_WRENCH, |robot| robot.hand_wrench[1][2] = -301.0),
             (stop_cause::HAND_WRENCH, |robot| robot.hand_wrench[0][4] = 101.0),
             (stop_cause::BALANCE, |robot| robot.zmp_margin_m = -0.001),
             (stop_cause::TILT, |robot| robot.base_pose[3..].copy_from_slice(&[0.99, 0.14, 0.0, 0.0])),
-            (stop_cause::GRASP, |robot| robot.holding_hands = 0b01),
         ];
         for (cause, spoil) in spoils {
             assert_eq!(stopped_at(spoil), Some((10 + PATIENCE_TICKS - 1, cause, 2)));
@@ -259,7 +257,7 @@ mod tests {
             if tick % PATIENCE_TICKS != 0 {
                 robot.zmp_margin_m = -1.0;
             }
-            safety.look(&mut state, tick, core::iter::once((&robot, 2)), STANDING, 0);
+            safety.look(&mut state, tick, core::iter::once((&robot, 0b11)), true, 0);
             assert!(!state.is_stopped());
         }
     }
@@ -268,7 +266,7 @@ mod tests {
     fn the_operator_stops_the_team_and_lets_it_go_on_by_script_or_by_word() {
         let (safety, mut state) = (safety(), SafetyState::default());
         let look = |state: &mut SafetyState, tick, robot: &RobotState, word| {
-            safety.look(state, tick, core::iter::once((robot, 2)), STANDING, word);
+            safety.look(state, tick, core::iter::once((robot, 0b11)), true, word);
             state.cause
         };
         for tick in 0..100 {
@@ -291,37 +289,38 @@ mod tests {
         let fallen = RobotState { zmp_margin_m: -0.1, ..well() };
         let mut word = 0;
         for tick in 1000..1020 {
-            safety.look(&mut state, tick, core::iter::once((&fallen, 2)), STANDING, word);
+            safety.look(&mut state, tick, core::iter::once((&fallen, 0b11)), true, word);
             word = operator::word_after(word, operator::RESUME);
         }
         assert_eq!((state.cause, state.robot), (stop_cause::BALANCE, 1));
-        safety.look(
-            &mut state,
-            1020,
-            core::iter::once((&well(), 2)),
-            SeenTeam { stands: false, ..STANDING },
-            word,
-        );
+        safety.look(&mut state, 1020, core::iter::once((&well(), 0b11)), false, word);
         assert!(state.is_stopped(), "it still steps");
         word = operator::word_after(word, operator::RESUME);
-        safety.look(&mut state, 1021, core::iter::once((&well(), 2)), STANDING, word);
+        safety.look(&mut state, 1021, core::iter::once((&well(), 0b11)), true, word);
         assert!(!state.is_stopped());
     }
 
     #[test]
-    fn a_hand_that_need_not_hold_may_be_open() {
+    fn a_hand_that_takes_no_part_may_feel_what_it_will() {
         let (safety, mut state) = (safety(), SafetyState::default());
-        let open = RobotState { holding_hands: 0, ..well() };
+        let mut robot = well();
+        robot.hand_wrench[1][2] = -301.0;
         for tick in 1000..1020 {
-            safety.look(
-                &mut state,
-                tick,
-                core::iter::once((&open, 2)),
-                SeenTeam { shall_hold: false, ..STANDING },
-                0,
-            );
+            safety.look(&mut state, tick, core::iter::once((&robot, 0b01)), true, 0);
         }
         assert!(!state.is_stopped());
+    }
+
+    #[test]
+    fn a_team_that_has_lost_a_hand_stops_until_the_operator_lets_it_go_on_and_says_what_came_first() {
+        let (safety, mut state) = (safety(), SafetyState::default());
+        state.stop(stop_cause::SLIP, 1, false);
+        assert!(!state.is_blind());
+        state.stop(stop_cause::TOO_FEW_HANDS, 0, true);
+        assert_eq!((state.cause, state.robot, state.is_blind()), (stop_cause::SLIP, 2, true));
+        let resume = operator::word_after(0, operator::RESUME);
+        safety.look(&mut state, 1000, core::iter::once((&well(), 0b11)), true, resume);
+        assert!(!state.is_stopped() && !state.is_blind());
     }
 
     #[test]

@@ -2,22 +2,23 @@
 
 use crate::build::{BuildCoordinatorError, build_hybrid_law, build_resting_law, virtual_sticks};
 use crate::grasp::GraspCompliance;
+use crate::grips::{self, GripState, Grips};
 use crate::job::{Job, Phase, PhaseWords, Seen};
 use crate::leading::{Leading, LeadingState};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::odometry::{self, OdometryFrames, OdometryState};
 use crate::reference::References;
-use crate::safety::{Safety, SafetyState, SeenTeam};
+use crate::safety::{Safety, SafetyState};
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_cooperation::{
-    Control, GeneralizedForce, GeneralizedPosition, HandInput, HandReference, HybridInputs, HybridLaw,
-    HybridOutput, HybridReference, HybridScratch, HybridState, VirtualStick,
+    Control, Formation, Gap, GeneralizedForce, GeneralizedPosition, HandInput, HandReference, HybridInputs,
+    HybridLaw, HybridOutput, HybridReference, HybridScratch, HybridState, VirtualStick,
 };
 use mikoshi_humanoid::gait::StepTiming;
 use mikoshi_ipc_types::{
-    MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, all_hands, mode,
+    MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, mode, stop_cause,
 };
 use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -35,6 +36,7 @@ pub struct Coordinator {
     resting_law: HybridLaw,
     references: References,
     compliance: GraspCompliance,
+    grips: Grips,
     odometry: OdometryFrames,
     /// Whether the team presses the object against something: an axis of it is under force control.
     presses: bool,
@@ -54,7 +56,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 4;
+pub(crate) const STATE_VERSION: u64 = 5;
 
 /// All that matters between ticks.
 #[repr(C)]
@@ -72,8 +74,14 @@ pub struct CoordinatorState {
     hand_wrench: [[f64; 6]; MAX_HANDS_OF_TEAM],
     /// Generalized force when the law started, row by row.
     force_at_start: [[f64; 6]; MAX_HANDS_OF_TEAM],
+    /// How far the object's reference was off when the team was last formed, so that its error went on.
+    off_at_start: [f64; 6],
     /// The tick in which it started, or in which another one took its place.
     hybrid_since: u64,
+    /// The tick since which it controls forces for the hands that it does.
+    formed_since: u64,
+    /// Which hands hold the object.
+    grips: GripState,
     phase: PhaseWords,
     safety: SafetyState,
     /// What the operator has said last.
@@ -89,10 +97,20 @@ unsafe impl Pod for CoordinatorState {}
 #[derive(Clone, Debug)]
 pub struct CoordinatorScratch {
     law: HybridScratch,
+    formation: Formation,
     law_output: HybridOutput,
     hands: Vec<HandInput>,
     force_ref: GeneralizedForce,
     position_ref: GeneralizedPosition,
+}
+
+/// What a tick has found.
+struct Now<'a> {
+    tick: u64,
+    law: &'a HybridOutput,
+    hands: &'a [HandInput],
+    /// The object touches nothing but hands.
+    is_free: bool,
 }
 
 /// What a tick says: a command for each robot, and the team's view for observers.
@@ -142,13 +160,14 @@ impl Coordinator {
             resting_law: build_resting_law(run)?,
             references,
             compliance: GraspCompliance::new(scenario),
+            grips: Grips::new(scenario, hands_of_robots(run)),
             leading: Leading::new(run)?,
             motion: ObjectMotion::new(run),
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
             job: Job::new(scenario),
             safety: Safety::new(scenario),
-            hands_of_robots: run.robots.iter().map(|robot| robot.grasping_hands.len()).collect(),
+            hands_of_robots: hands_of_robots(run),
             sticks: virtual_sticks(run)?,
             X_WA_start: Pose::new(
                 Vector3::from(scenario.object.position_m),
@@ -170,7 +189,10 @@ impl Coordinator {
             leading: LeadingState::at_start(None, &Pose::identity(), &[]),
             hand_wrench: [[0.0; 6]; MAX_HANDS_OF_TEAM],
             force_at_start: [[0.0; 6]; MAX_HANDS_OF_TEAM],
+            off_at_start: [0.0; 6],
             hybrid_since: 0,
+            formed_since: 0,
+            grips: GripState::zeroed(),
             phase: Phase::default().to_words(),
             safety: SafetyState::default(),
             operator_word: 0,
@@ -187,6 +209,7 @@ impl Coordinator {
         let arms = self.law.arms();
         CoordinatorScratch {
             law: self.law.scratch(),
+            formation: self.law.internal_forces().whole().clone(),
             law_output: self.law.output(),
             hands: Vec::with_capacity(arms),
             force_ref: GeneralizedForce::zero(arms),
@@ -204,20 +227,22 @@ impl Coordinator {
         robots: impl Iterator<Item = &'a RobotState> + Clone,
         out: &mut CoordinatorOutputs,
     ) -> Result<(), CoordinateError> {
-        let CoordinatorScratch { law: law_scratch, law_output, hands, force_ref, position_ref } = scratch;
+        let CoordinatorScratch { law: law_scratch, formation, law_output, hands, force_ref, position_ref } =
+            scratch;
+        self.law.form(&state.hybrid, formation).map_err(|_| CoordinateError::State)?;
+        let present = self.grips.present(&state.hybrid);
         let X_WO = state.odometry.frames().ok_or(CoordinateError::State)?;
         read_hands(robots.clone(), &self.hands_of_robots, &X_WO, hands)?;
         let wishes = Wishes::of(robots.clone());
 
         let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
         let mut safety = state.safety;
-        let of_team = robots.clone().zip(self.hands_of_robots.iter().copied());
+        let of_team = robots.clone().zip(present);
         let carries = mode::is_hybrid(phase.mode());
-        let team = SeenTeam { shall_hold: carries, stands: state.clock.is_standing() };
-        self.safety.look(&mut safety, tick, of_team, team, state.operator_word);
+        self.safety.look(&mut safety, tick, of_team, state.clock.is_standing(), state.operator_word);
         let is_stopped = safety.is_stopped();
         let is_free = self.job.is_in_the_air(&phase) && !self.presses;
-        let (hand_wrench, grasp_yield) = self.grasp_yield(state, hands, is_free)?;
+        let (hand_wrench, grasp_yield) = self.grasp_yield(state, formation, hands, is_free)?;
         // Control ends with the first tick of doubt, and starts again after the last.
         let is_blind = safety.is_blind() || state.safety.is_blind();
         let is_hybrid = carries && !is_blind;
@@ -239,8 +264,9 @@ impl Coordinator {
         let may_walk = phase.mode() == mode::CARRY;
         let clock = state.clock.advance(&self.timing, &wishes, may_walk).ok_or(CoordinateError::State)?;
 
-        let ticks_since_start = tick.saturating_sub(state.hybrid_since);
-        self.references.fill(ticks_since_start, &X_WA_ref, &state.force_at_start, force_ref, position_ref);
+        let since_start = [state.hybrid_since, state.formed_since].map(|since| tick.saturating_sub(since));
+        let start = (&state.force_at_start[..], &state.off_at_start);
+        self.references.fill(since_start, &X_WA_ref, start, force_ref, position_ref);
         // A leader's team has no hybrid law: hands are where leader and followers have them.
         let is_led = is_hybrid && self.leading.is_some();
         let reference = (is_hybrid && !is_led).then_some(HybridReference {
@@ -271,21 +297,28 @@ impl Coordinator {
         out.team_state.odometry_pose = X_WO.map(|X_WO| X_WO.to_array());
         out.team_state.speed_share = speed_share;
         if is_hybrid && !is_led && !state.clock.is_standing() {
-            self.correct_odometry(state, hands, law_output);
+            self.correct_odometry(state, formation, hands, law_output);
+        }
+        if carries && !is_blind {
+            let now = Now { tick, law: law_output, hands, is_free };
+            let scratch = (&mut *law_scratch, &mut *formation);
+            self.watch_grips(state, scratch, &now, robots.clone(), &mut out.team_state.hand_slip)?;
         }
 
         if is_blind && !safety.is_blind() && carries {
             let X_WA = &law_output.position.external;
             let path_time_s = state.motion.path_time_s;
             state.motion = ObjectMotionState { path_time_s, ..ObjectMotionState::at_rest(X_WA) };
-            start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
+            self.start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
         }
         if is_stopped || is_blind {
             state.phase = phase.delayed().to_words();
             return Ok(());
         }
-        let seen = self.look(state, hands, robots, &wishes, law_output);
-        let next = self.job.next(phase, tick + 1, &seen);
+        let seen = self.look(state, hands, robots, &present, &wishes, law_output);
+        // Where the others carry on without a hand, letting go is no failure.
+        let all_hold = seen.all_hold || carries && self.grips.carries_on;
+        let next = self.job.next(phase, tick + 1, &Seen { all_hold, ..seen });
         if next != phase {
             // Whatever a phase moves comes to rest in its end.
             state.motion.twist = [0.0; 6];
@@ -295,21 +328,27 @@ impl Coordinator {
                 let X_WA = &law_output.position.external;
                 state.motion = ObjectMotionState::at_rest(X_WA);
                 state.leading = LeadingState::at_start(self.leading.as_ref(), X_WA, hands);
-                start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
+                self.start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
             } else if is_hybrid && next.is_resting() != phase.is_resting() {
-                start_law(state, tick + 1, hands, &grasp_yield, &X_WA_ref, law_output);
+                self.start_law(state, tick + 1, hands, &grasp_yield, &X_WA_ref, law_output);
             }
         }
         Ok(())
     }
 
     /// The team steps with the object in its hands, which tells how far robots' odometries have parted.
-    fn correct_odometry(&self, state: &mut CoordinatorState, hands: &[HandInput], law: &HybridOutput) {
+    fn correct_odometry(
+        &self,
+        state: &mut CoordinatorState,
+        formation: &Formation,
+        hands: &[HandInput],
+        law: &HybridOutput,
+    ) {
         let seen = odometry::Seen {
             X_WA: &law.position.external,
             hands,
             hand_wrench: &state.hand_wrench,
-            shares: self.law.internal_forces().w_inverse(),
+            shares: formation.w_inverse(),
             hands_of_robots: &self.hands_of_robots,
             compliance: &self.compliance,
         };
@@ -318,12 +357,97 @@ impl Coordinator {
         debug_assert!(corrected.is_some(), "sticks were read in this tick");
     }
 
+    /// Whether all hands that take part still hold; who doesn't is left out from the next tick on.
+    fn watch_grips<'a>(
+        &self,
+        state: &mut CoordinatorState,
+        scratch: (&mut HybridScratch, &mut Formation),
+        now: &Now<'_>,
+        robots: impl Iterator<Item = &'a RobotState>,
+        hand_slip: &mut [f64; MAX_HANDS_OF_TEAM],
+    ) -> Result<(), CoordinateError> {
+        let CoordinatorState { grips, hybrid, hand_wrench, .. } = state;
+        let is_led = self.leading.is_some();
+        let mut gaps = [None; MAX_HANDS_OF_TEAM];
+        // A leader's followers are not where the law would have them.
+        if !is_led {
+            let seen = grips::Seen { X_WA: &now.law.position.external, hands: now.hands, hand_wrench };
+            gaps = self.grips.gaps(grips, hybrid, &seen);
+        }
+        *hand_slip = self.grips.slips(&gaps);
+        let Some(loss) = self.grips.find_loss(grips, hybrid, hand_slip, robots) else { return Ok(()) };
+        grips.loss_cause = loss.cause;
+        let are_too_few = self.grips.are_too_few(hybrid, &loss);
+        let is_formed = !is_led && self.do_without(state, scratch, now, loss.hands, &gaps)?;
+        let is_blind = !is_led && !is_formed;
+        if are_too_few {
+            state.safety.stop(stop_cause::TOO_FEW_HANDS, loss.robot, is_blind);
+        } else if !is_formed || !self.grips.carries_on {
+            state.safety.stop(loss.cause, loss.robot, is_blind);
+        }
+        Ok(())
+    }
+
+    /// Forms the team anew without the lost hands, from the next tick on; false if it can't be.
+    fn do_without(
+        &self,
+        state: &mut CoordinatorState,
+        (law_scratch, formation): (&mut HybridScratch, &mut Formation),
+        now: &Now<'_>,
+        lost: u64,
+        gaps: &[Option<Gap>; MAX_HANDS_OF_TEAM],
+    ) -> Result<bool, CoordinateError> {
+        let gone = grips::absent(&state.hybrid) | lost;
+        let stays = |arm: usize| gone & 1 << arm == 0;
+        if self.law.internal_forces().form(stays, formation).is_err() {
+            return Ok(false);
+        }
+        // Those who stay are seen off their grips by what the lost have brought into the mean: Σa is where they have it.
+        let mut off = [Twist::zero(); MAX_HANDS_OF_TEAM];
+        let mut mean = Twist::zero();
+        for ((off, gap), share) in off.iter_mut().zip(gaps).zip(formation.w_inverse()) {
+            *off = gap.map_or_else(Twist::zero, |gap| gap.tip);
+            mean += *off * *share;
+        }
+        off.iter_mut().for_each(|off| *off = *off - mean);
+        let X_WA = now.law.position.external.displaced(&mean);
+        let (_, grasp_yield) = self.grasp_yield(state, formation, now.hands, now.is_free)?;
+        let X_WB = X_WA.displaced(&-grasp_yield);
+        if self.law.reform(&mut state.hybrid, law_scratch, &X_WB, now.hands, stays).is_err() {
+            return Ok(false);
+        }
+        let seen = grips::Seen { X_WA: &X_WA, hands: now.hands, hand_wrench: &state.hand_wrench };
+        self.grips.remember(&mut state.grips, &state.hybrid, &seen, &off);
+        // References begin with what is there (ADR 0010), and the object's with the error that there was.
+        state.force_at_start = state.hybrid.filtered_force;
+        let since = now.tick.saturating_sub(state.formed_since);
+        state.off_at_start = (self.references.off_after(since, &state.off_at_start) + mean).to_array();
+        state.formed_since = now.tick + 1;
+        Ok(true)
+    }
+
+    /// The law starts at `tick`, as [`start_law`] says, with all who take part in their grips.
+    fn start_law(
+        &self,
+        state: &mut CoordinatorState,
+        tick: u64,
+        hands: &[HandInput],
+        grasp_yield: &Twist<World>,
+        X_WA: &Pose<World, Object>,
+        law: &HybridOutput,
+    ) {
+        start_law(state, tick, hands, grasp_yield, X_WA, law);
+        let seen = grips::Seen { X_WA, hands, hand_wrench: &state.hand_wrench };
+        self.grips.begin(&mut state.grips, &state.hybrid, &seen);
+    }
+
     /// What decides how the job goes on.
     fn look<'a>(
         &self,
         state: &CoordinatorState,
         hands: &[HandInput],
         robots: impl Iterator<Item = &'a RobotState> + Clone,
+        present: &[u64; MAX_ROBOTS],
         wishes: &Wishes,
         law: &HybridOutput,
     ) -> Seen {
@@ -333,11 +457,11 @@ impl Coordinator {
             let gap = place.displacement_to(&hand.pose);
             gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
         };
-        let holding = || robots.clone().zip(&self.hands_of_robots);
+        let mut holding = robots.clone().zip(present);
         Seen {
             in_reach: hands.iter().zip(&self.sticks).all(is_in_reach),
-            all_hold: holding().all(|(robot, &hands)| robot.holding_hands == all_hands(hands)),
-            none_holds: holding().all(|(robot, _)| robot.holding_hands == 0),
+            all_hold: holding.all(|(robot, &present)| grips::all_hold(robot, present)),
+            none_holds: robots.clone().all(|robot| robot.holding_hands == 0),
             motion_is_over: self.motion.is_over(&state.motion),
             team_stands: state.clock.is_standing() && wishes.are_content(),
             carried_n: law.force.external.force.z,
@@ -349,6 +473,7 @@ impl Coordinator {
     fn grasp_yield(
         &self,
         state: &CoordinatorState,
+        formation: &Formation,
         hands: &[HandInput],
         is_free: bool,
     ) -> Result<([[f64; 6]; MAX_HANDS_OF_TEAM], Twist<World>), CoordinateError> {
@@ -357,9 +482,8 @@ impl Coordinator {
             stick.X_HB = Pose::from_array(array).ok_or(CoordinateError::State)?;
         }
         let mut hand_wrench = state.hand_wrench;
-        let shares = self.law.internal_forces().w_inverse();
         let hands = hands.iter().zip(&sticks);
-        let found = self.compliance.object_yield(&mut hand_wrench, hands, shares, is_free);
+        let found = self.compliance.object_yield(&mut hand_wrench, hands, formation.w_inverse(), is_free);
         Ok((hand_wrench, found))
     }
 
@@ -373,15 +497,16 @@ impl Coordinator {
         out: &mut CoordinatorOutputs,
     ) {
         let mut references = law.hands.iter();
-        let robots = self.hands_of_robots.iter().zip(&state.leading.clocks).zip(X_WO);
-        for (command, ((&hands, own_clock), X_WO)) in out.commands.iter_mut().zip(robots) {
+        let present = self.grips.present(&state.hybrid);
+        let robots = self.hands_of_robots.iter().zip(&state.leading.clocks).zip(X_WO).zip(present);
+        for (command, (((&hands, own_clock), X_WO), present)) in out.commands.iter_mut().zip(robots) {
             let X_OW = X_WO.inverse();
             let clock = if self.leading.is_some() { own_clock } else { &state.clock };
             *command = TeamCommand {
                 team_mode: mode_of(state, phase),
                 state_tick: tick,
                 step_clock: clock.clock,
-                closed_hands: if self.job.closes_hands(phase) { all_hands(hands) } else { 0 },
+                closed_hands: if self.job.closes_hands(phase) { present } else { 0 },
                 ..TeamCommand::zeroed()
             };
             for (hand, reference) in references.by_ref().take(hands.min(MAX_HANDS)).enumerate() {
@@ -398,6 +523,7 @@ impl CoordinatorScratch {
     pub fn poison(&mut self) {
         let nan = f64::NAN;
         self.law.poison();
+        self.formation.poison();
         self.hands.clear();
         self.force_ref.external = Wrench::from_array(&[nan; 6]);
         self.force_ref.internal.fill(Wrench::from_array(&[nan; 6]));
@@ -430,6 +556,10 @@ impl Default for CoordinatorOutputs {
     fn default() -> Self {
         Self { commands: [TeamCommand::zeroed(); MAX_ROBOTS], team_state: TeamState::zeroed() }
     }
+}
+
+fn hands_of_robots(run: &RunSpec) -> Vec<usize> {
+    run.robots.iter().map(|robot| robot.grasping_hands.len()).collect()
 }
 
 /// What robots say of their hands, each in its own frame O, in the world of the team.
@@ -468,7 +598,7 @@ fn start_law(
     for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
         *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
     }
-    state.hybrid_since = tick;
+    (state.hybrid_since, state.formed_since, state.off_at_start) = (tick, tick, [0.0; 6]);
     write_force(&law.force, &mut state.force_at_start);
 }
 
@@ -518,6 +648,8 @@ fn write_team_state(
         operator_word: state.safety.operator_word,
         stop_cause: state.safety.cause,
         stop_robot: state.safety.robot,
+        absent_hands: grips::absent(&state.hybrid),
+        loss_cause: state.grips.loss_cause,
         ..TeamState::zeroed()
     };
     write_force(&law.force, &mut team_state.generalized_force);

@@ -159,6 +159,9 @@ fn a_hand_that_is_no_pose_is_refused_and_changes_nothing() {
     assert_eq!(out, CoordinatorOutputs::default());
 }
 
+/// Robots that do what they are told give way for ever to moments that go with no object: they may slip.
+const MAY_SLIP: [(&str, &str); 2] = [("safety.slip_m", "1.0"), ("safety.slip_rad", "1.0")];
+
 /// Robots that do what they are told: hands are where they shall be and hold if they shall. The object weighs
 /// on hands that have lifted it.
 fn obedient(run: &RunSpec, commands: &[TeamCommand], lifted_m: f64) -> Vec<RobotState> {
@@ -200,7 +203,7 @@ fn a_job_goes_through_all_its_modes_without_an_allocation_and_without_a_jump() {
         ("job.settle_s", "0.5"),
         ("job.unload_s", "0.5"),
     ];
-    let run = resolved("pick_and_place", &short);
+    let run = resolved("pick_and_place", &[&short[..], &MAY_SLIP].concat());
     let coordinator = Coordinator::new(&run).expect("a coordinator");
     let (mut state, mut scratch) = (coordinator.initial_state().expect("a state"), coordinator.scratch());
     let (mut other_state, mut poisoned) = (state, coordinator.scratch());
@@ -242,7 +245,7 @@ fn a_job_goes_through_all_its_modes_without_an_allocation_and_without_a_jump() {
 
 #[test]
 fn a_hand_that_lets_go_on_the_way_stops_the_team_where_it_is() {
-    let run = resolved("pick_and_place", &[("job.settle_s", "0.5")]);
+    let run = resolved("pick_and_place", &[&[("job.settle_s", "0.5")][..], &MAY_SLIP].concat());
     let coordinator = Coordinator::new(&run).expect("a coordinator");
     let (mut state, mut scratch) = (coordinator.initial_state().expect("a state"), coordinator.scratch());
     let (mut out, mut commands) = (CoordinatorOutputs::default(), drawn_back(&run, 0.05));

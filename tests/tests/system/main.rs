@@ -9,6 +9,7 @@ mod faults;
 mod job;
 mod latency;
 mod leader_follower;
+mod lost_grasp;
 mod real_time;
 mod record;
 mod replay;

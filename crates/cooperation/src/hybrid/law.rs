@@ -4,7 +4,9 @@ use super::{
     BuildHybridLawError, HandInput, HandReference, HybridError, HybridInputs, HybridOutput, HybridParameters,
     HybridReference, HybridScratch, HybridState,
 };
-use crate::{GeneralizedForce, GeneralizedPosition, InternalForces, VirtualStick, WorkspaceScratch};
+use crate::{
+    FormedForces, GeneralizedForce, GeneralizedPosition, InternalForces, VirtualStick, WorkspaceScratch,
+};
 use core::f64::consts::PI;
 use mikoshi_spatial::{CoordinateFrame, Hand, Object, Pose, Twist, World, Wrench};
 use nalgebra::{Vector3, Vector6};
@@ -83,11 +85,13 @@ impl HybridLaw {
     ) -> Result<(), HybridError> {
         self.check(state, scratch, inputs, out)?;
         load(state, scratch, inputs.hands)?;
-        let HybridScratch { workspace, sticks, hand_pose_ref } = scratch;
+        self.form(state, &mut scratch.formation)?;
+        let HybridScratch { workspace, sticks, hand_pose_ref, formation } = scratch;
+        let forces = self.internal_forces.among(formation);
         let HybridOutput { force: h_c, position: z_c, hands: references, hands_held_back } = out;
 
         let hands = sticks.iter().zip(inputs.hands).map(|(stick, hand)| (*stick, hand.pose, hand.wrench));
-        workspace.evaluate(&self.internal_forces, hands, h_c, z_c);
+        workspace.evaluate(&forces, hands, h_c, z_c);
         z_c.external = z_c.external.displaced(&inputs.grasp_yield);
         self.filter(state, h_c);
         state.ticks += 1;
@@ -102,8 +106,8 @@ impl HybridLaw {
             return Ok(());
         };
 
-        let giving_way = self.external_giving_way(h_c, reference, sticks, inputs.hands);
-        self.deal_out_errors(h_c, z_c, reference, &giving_way, workspace);
+        let giving_way = self.external_giving_way(h_c, reference, &forces, sticks, inputs.hands);
+        self.deal_out_errors(h_c, z_c, reference, &giving_way, &forces, workspace);
         let object_twist = self.feed_forward(reference);
         for ((((out, pose), hand), stick), (tip, lacking)) in references
             .iter_mut()
@@ -123,7 +127,7 @@ impl HybridLaw {
             *hands_held_back += usize::from(is_held_back);
             *out = HandReference { pose, twist, wrench: Wrench::zero() };
         }
-        self.deal_out_forces(h_c, z_c, reference, workspace);
+        self.deal_out_forces(h_c, z_c, reference, &forces, workspace);
         let tips = sticks.iter().zip(&workspace.tip_wrenches);
         for ((out, hand), (stick, tip)) in references.iter_mut().zip(inputs.hands).zip(tips) {
             out.wrench = stick.hand_wrench(&hand.pose, tip);
@@ -139,6 +143,7 @@ impl HybridLaw {
         h_c: &GeneralizedForce,
         z_c: &GeneralizedPosition,
         reference: &HybridReference,
+        forces: &FormedForces<'_>,
         workspace: &mut WorkspaceScratch,
     ) {
         let WorkspaceScratch { tip_wrenches, row_wrenches, work_wrenches, .. } = workspace;
@@ -151,7 +156,7 @@ impl HybridLaw {
         for ((row, h), (h_r, h_c)) in rows.zip(internal) {
             *h = row.expected_force(h_r, h_c).expressed_in(X_WA);
         }
-        self.internal_forces.tip_forces(row_wrenches, tip_wrenches, work_wrenches);
+        forces.tip_forces(row_wrenches, tip_wrenches, work_wrenches);
     }
 
     fn check<const CAPACITY: usize>(
@@ -223,6 +228,7 @@ impl HybridLaw {
         &self,
         h_c: &GeneralizedForce,
         reference: &HybridReference,
+        forces: &FormedForces<'_>,
         sticks: &[VirtualStick],
         hands: &[HandInput],
     ) -> Twist<World> {
@@ -232,11 +238,13 @@ impl HybridLaw {
         let HybridParameters { kz, kh, period_s, approach_limit_m_s, approach_limit_rad_s, .. } =
             &self.parameters;
         let mut levers = Vector3::zeros();
-        for (stick, hand) in sticks.iter().zip(hands) {
+        let formation = forces.formation();
+        let arms = sticks.iter().zip(hands).enumerate();
+        for (_, (stick, hand)) in arms.filter(|(arm, _)| formation.takes_part(*arm)) {
             let l = stick.vector(&hand.pose);
             levers += Vector3::repeat(l.norm_squared()) - l.component_mul(&l);
         }
-        let n = self.arms() as f64;
+        let n = formation.arms() as f64;
         let by_levers = |lever: f64| if lever > 0.0 { lever / kh.m_n } else { 0.0 };
         let turning = levers.map(|lever| 1.0 / (n / kh.rad_nm + by_levers(lever)));
         let lacking = row.force_error(&reference.force.external, &h_c.external);
@@ -257,6 +265,7 @@ impl HybridLaw {
         z_c: &GeneralizedPosition,
         reference: &HybridReference,
         external_giving_way: &Twist<World>,
+        forces: &FormedForces<'_>,
         workspace: &mut WorkspaceScratch,
     ) {
         let WorkspaceScratch {
@@ -284,9 +293,9 @@ impl HybridLaw {
             *dh = row.force_error(h_r, h_c).expressed_in(X_WA);
         }
         // By duality with eq. 9; the paper leaves this step to J†.
-        self.internal_forces.tip_displacements(row_twists, tip_twists, work_twists);
+        forces.tip_displacements(row_twists, tip_twists, work_twists);
         // Eq. 7.
-        self.internal_forces.tip_forces(row_wrenches, tip_wrenches, work_wrenches);
+        forces.tip_forces(row_wrenches, tip_wrenches, work_wrenches);
     }
 
     /// What feedback adds to a hand's reference: k_z of its tip's displacement, and k_z k_h of the wrench

@@ -1,7 +1,7 @@
 //! What the law remembers from tick to tick, and what it doesn't.
 
 use crate::workspace::nan_pose;
-use crate::{InternalForces, VirtualStick, WorkspaceScratch};
+use crate::{Formation, InternalForces, VirtualStick, WorkspaceScratch};
 use bytemuck::{Pod, Zeroable};
 use mikoshi_spatial::{Hand, Pose, World};
 
@@ -20,6 +20,8 @@ pub struct HybridState<const CAPACITY: usize> {
     pub filtered_force: [[f64; 6]; CAPACITY],
     /// The last hand references `X_WH`.
     pub hand_pose_ref: [[f64; 7]; CAPACITY],
+    /// Not 0 where an arm takes no part, for [`HybridLaw::reform`](crate::HybridLaw::reform) to change.
+    pub is_absent: [u64; CAPACITY],
 }
 
 // SAFETY: zeros are a valid value of integers and floats.
@@ -56,6 +58,11 @@ impl<const CAPACITY: usize> HybridState<CAPACITY> {
         Ok(state)
     }
 
+    /// Whether an arm takes part.
+    pub fn takes_part(&self, arm: usize) -> bool {
+        self.is_absent.get(arm) == Some(&0)
+    }
+
     /// The virtual stick of a hand.
     pub fn stick(&self, hand: usize) -> Option<VirtualStick> {
         self.sticks.get(hand).and_then(Pose::from_array).map(|X_HB| VirtualStick { X_HB })
@@ -66,6 +73,7 @@ impl<const CAPACITY: usize> HybridState<CAPACITY> {
 #[derive(Clone, Debug)]
 pub struct HybridScratch {
     pub(super) workspace: WorkspaceScratch,
+    pub(super) formation: Formation,
     pub(super) sticks: Vec<VirtualStick>,
     pub(super) hand_pose_ref: Vec<Pose<World, Hand>>,
 }
@@ -76,6 +84,7 @@ impl HybridScratch {
         let n = internal_forces.arms();
         Self {
             workspace: WorkspaceScratch::new(internal_forces),
+            formation: internal_forces.whole().clone(),
             sticks: vec![VirtualStick { X_HB: Pose::identity() }; n],
             hand_pose_ref: vec![Pose::identity(); n],
         }
@@ -84,6 +93,7 @@ impl HybridScratch {
     /// Overwrites every number with NaN.
     pub fn poison(&mut self) {
         self.workspace.poison();
+        self.formation.poison();
         self.sticks.fill(VirtualStick { X_HB: nan_pose() });
         self.hand_pose_ref.fill(nan_pose());
     }

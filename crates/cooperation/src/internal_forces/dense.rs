@@ -1,6 +1,7 @@
 //! Internal forces by any matrix of full rank, applied in O(n²).
 
 use super::OBJECT_ROW;
+use super::formation::Formation;
 use crate::Linear;
 use core::fmt;
 use faer::Mat;
@@ -90,9 +91,10 @@ impl DenseMap {
         Self { arms, w_and_c: row_by_row(&w_and_c), u: row_by_row(&u) }
     }
 
-    /// The first column of U.
-    pub fn w_inverse(&self) -> Vec<f64> {
-        self.u.iter().step_by(self.arms).copied().collect()
+    /// Of the whole team: W⁻ is the first column of U.
+    pub fn whole(&self) -> Formation {
+        let w_inverse = self.u.iter().step_by(self.arms).copied().collect();
+        Formation { w_inverse, shares: vec![], counts: vec![], arms: self.arms }
     }
 
     pub fn generalized_force<T: Linear>(&self, tips: &[T], rows: &mut [T]) {

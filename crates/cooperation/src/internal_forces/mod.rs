@@ -2,13 +2,15 @@
 
 mod analysis;
 mod dense;
+mod formation;
 mod split;
 mod tree;
 
 pub use analysis::{change_of_representation, pair_matrix, pairwise_forces};
 pub use dense::{BuildInternalForcesError, RowCombination};
+pub use formation::{FormError, Formation, FormedForces};
 
-use crate::{Linear, TeamArms};
+use crate::TeamArms;
 use dense::DenseMap;
 use nalgebra::DMatrix;
 use split::{Split, chain, level_order};
@@ -24,8 +26,8 @@ pub const OBJECT_ROW: &str = "object";
 #[derive(Clone, Debug)]
 pub struct InternalForces {
     names: Vec<String>,
-    w_inverse: Vec<f64>,
     map: Map,
+    whole: Formation,
 }
 
 #[derive(Clone, Debug)]
@@ -41,13 +43,9 @@ impl InternalForces {
     /// `|L||R|/(|L|+|R|) · (mean of L − mean of R)`. For equal groups that is eqs. 20, 21 and 43; for
     /// unequal ones it keeps every block of W⁻ at 1/n, so the object's motion is the mean of the tips'.
     pub fn balanced_tree(team: &TeamArms) -> Self {
-        let arms = team.arms();
         let splits = level_order(team);
-        Self {
-            names: names_of(&splits),
-            w_inverse: vec![1.0 / arms as f64; arms],
-            map: Map::Tree(GroupTree::new(arms, &splits)),
-        }
+        let tree = GroupTree::new(team.arms(), &splits);
+        Self { names: names_of(&splits), whole: tree.whole(), map: Map::Tree(tree) }
     }
 
     /// The chain of eq. 24 and fig. 3: each robot's neighbouring arms, then robot i against robot i + 1.
@@ -58,14 +56,14 @@ impl InternalForces {
         let splits = chain(team);
         let rows: Vec<Vec<f64>> = splits.iter().map(|split| split.coefficients(arms)).collect();
         let map = DenseMap::of_full_rank(&rows, arms);
-        Self { names: names_of(&splits), w_inverse: map.w_inverse(), map: Map::Dense(map) }
+        Self { names: names_of(&splits), whole: map.whole(), map: Map::Dense(map) }
     }
 
     /// Any C of full rank, given by its n − 1 rows of n coefficients; the rows are called r1, r2, …
     pub fn from_matrix(rows: &[Vec<f64>], arms: usize) -> Result<Self, BuildInternalForcesError> {
         let map = DenseMap::new(rows, arms)?;
         let names = (0..arms).map(dense::row_name).collect();
-        Ok(Self { names, w_inverse: map.w_inverse(), map: Map::Dense(map) })
+        Ok(Self { names, whole: map.whole(), map: Map::Dense(map) })
     }
 
     /// Number n of arms, and of rows.
@@ -83,36 +81,47 @@ impl InternalForces {
         self.names.iter().position(|known| known == name)
     }
 
-    /// h = [W; C] q_b (eq. 11): n rows from n tip wrenches. `work` holds [`InternalForces::work_len`].
-    pub fn generalized_force<T: Linear>(&self, tips: &[T], rows: &mut [T], work: &mut [T]) {
-        match &self.map {
-            Map::Tree(tree) => tree.generalized_force(tips, rows, work),
-            Map::Dense(dense) => dense.generalized_force(tips, rows),
-        }
+    /// Among all arms.
+    pub fn of_all(&self) -> FormedForces<'_> {
+        FormedForces { forces: self, formation: &self.whole }
     }
 
-    /// q_b = U h (eq. 7), the inverse of [`InternalForces::generalized_force`].
-    pub fn tip_forces<T: Linear>(&self, rows: &[T], tips: &mut [T], work: &mut [T]) {
-        match &self.map {
-            Map::Tree(tree) => tree.tip_forces(rows, tips, work),
-            Map::Dense(dense) => dense.tip_forces(rows, tips),
-        }
+    /// Among the arms of a formation of this team.
+    pub fn among<'a>(&'a self, formation: &'a Formation) -> FormedForces<'a> {
+        FormedForces { forces: self, formation }
     }
 
-    /// z = Uᵀ y_b (eq. 27): n rows from n tip positions.
-    pub fn generalized_position<T: Linear>(&self, tips: &[T], rows: &mut [T], work: &mut [T]) {
-        match &self.map {
-            Map::Tree(tree) => tree.generalized_position(tips, rows, work),
-            Map::Dense(dense) => dense.generalized_position(tips, rows),
-        }
+    /// All arms.
+    pub fn whole(&self) -> &Formation {
+        &self.whole
     }
 
-    /// δy_b = [W; C]ᵀ δz, the inverse of eq. 27 and the dual of eq. 11: `h · δz = q_b · δy_b`.
-    pub fn tip_displacements<T: Linear>(&self, rows: &[T], tips: &mut [T], work: &mut [T]) {
-        match &self.map {
-            Map::Tree(tree) => tree.tip_displacements(rows, tips, work),
-            Map::Dense(dense) => dense.tip_displacements(rows, tips),
+    /// Whether the team can do without some of its arms.
+    pub fn can_re_form(&self) -> bool {
+        matches!(self.map, Map::Tree(_))
+    }
+
+    /// Forms the arms that take part. O(n), no allocation.
+    ///
+    /// # Errors
+    /// There is none, or C is a matrix and one is missing. Nothing has changed.
+    pub fn form(
+        &self,
+        takes_part: impl Fn(usize) -> bool,
+        formation: &mut Formation,
+    ) -> Result<(), FormError> {
+        if formation.w_inverse.len() != self.arms() {
+            return Err(FormError::WrongSize);
         }
+        if !(0..self.arms()).any(&takes_part) {
+            return Err(FormError::NoArm);
+        }
+        match &self.map {
+            Map::Tree(tree) => tree.form(takes_part, formation),
+            Map::Dense(_) if !(0..self.arms()).all(&takes_part) => return Err(FormError::NotATree),
+            Map::Dense(_) => {}
+        }
+        Ok(())
     }
 
     /// Elements of `work` that the four maps need.
@@ -125,12 +134,12 @@ impl InternalForces {
 
     /// W⁻ (eq. 6): n weights, of sum one, with which the tips make up the object's position.
     pub fn w_inverse(&self) -> &[f64] {
-        &self.w_inverse
+        self.whole.w_inverse()
     }
 
     /// [W; C] (eq. 11), n × n; row 0 is W. Made on demand.
     pub fn w_and_c(&self) -> DMatrix<f64> {
-        self.columns(Self::generalized_force)
+        self.of_all().w_and_c()
     }
 
     /// C (eq. 11), (n − 1) × n. Made on demand.
@@ -140,25 +149,12 @@ impl InternalForces {
 
     /// U = [W⁻ V] (eq. 12), n × n. Made on demand.
     pub fn u(&self) -> DMatrix<f64> {
-        self.columns(Self::tip_forces)
+        self.of_all().u()
     }
 
     /// V (eq. 4), n × (n − 1). Made on demand.
     pub fn v(&self) -> DMatrix<f64> {
         self.u().remove_column(0)
-    }
-
-    /// The matrix of a map, by its action on unit vectors.
-    fn columns(&self, map: impl Fn(&Self, &[f64], &mut [f64], &mut [f64])) -> DMatrix<f64> {
-        let n = self.arms();
-        let mut matrix = DMatrix::zeros(n, n);
-        let (mut unit, mut work) = (vec![0.0; n], vec![0.0; self.work_len()]);
-        for column in 0..n {
-            unit[column] = 1.0;
-            map(self, &unit, matrix.column_mut(column).as_mut_slice(), &mut work);
-            unit[column] = 0.0;
-        }
-        matrix
     }
 }
 

@@ -75,6 +75,8 @@ pub struct ClosedLoop {
     pub twist_ref: Twist<World>,
     /// Nothing moves the object, as if a wall held it on all sides.
     pub is_object_fixed: bool,
+    /// Hands that don't hold it any more.
+    pub lost: Vec<usize>,
 }
 
 impl ClosedLoop {
@@ -110,6 +112,7 @@ impl ClosedLoop {
             position_ref: GeneralizedPosition::at_grasp(X_WA, n),
             twist_ref: Twist::zero(),
             is_object_fixed: false,
+            lost: vec![],
         };
         closed_loop.settle();
         closed_loop
@@ -124,7 +127,17 @@ impl ClosedLoop {
             Wrench::new(stretch.linear * STIFFNESS.n_m, stretch.angular * STIFFNESS.nm_rad)
                 .shifted(&(X_WG.translation - X_WH.translation))
         };
-        self.grasp.iter().zip(hands).map(wrench).collect()
+        let mut wrenches: Vec<_> = self.grasp.iter().zip(hands).map(wrench).collect();
+        for &hand in &self.lost {
+            wrenches[hand] = Wrench::zero();
+        }
+        wrenches
+    }
+
+    /// A hand lets go.
+    pub fn lose(&mut self, hand: usize) {
+        self.lost.push(hand);
+        self.settle();
     }
 
     /// The object moves to where all wrenches balance: Newton's method with the stiffness of its first step.
