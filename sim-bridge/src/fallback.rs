@@ -147,3 +147,122 @@ impl FallbackState {
         self.changes = 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::tests::{BEGIN, LIMITS, angle, part};
+    use mikoshi_ipc_types::FALLBACK_PARTS;
+
+    const PARTS: u64 = FALLBACK_PARTS as u64;
+    const PERIOD_S: f64 = 0.005;
+
+    fn fallback() -> Fallback {
+        Fallback::new(PERIOD_S, LIMITS.to_vec())
+    }
+
+    /// As the plan has it at its beginning, and a little beside it.
+    fn command(index: u64) -> JointCommand {
+        let mut command = part(index);
+        command.joint_position_ref_rad[..2].copy_from_slice(&[0.03, 0.02]);
+        command
+    }
+
+    /// Drives that have heard a whole plan, what they were told last, and the tick of their first miss.
+    fn after_a_plan(fallback: &Fallback) -> (FallbackState, JointCommand, u64) {
+        let (mut state, mut last) = (FallbackState::zeroed(), JointCommand::zeroed());
+        for index in 0..PARTS {
+            let command = command(index);
+            last = fallback.hear(&mut state, BEGIN + index, &command, &last);
+            assert_eq!(bytemuck::bytes_of(&last), bytemuck::bytes_of(&command), "nothing is missing");
+        }
+        (state, last, BEGIN + PARTS)
+    }
+
+    /// Misses so many ticks from `tick` on; the largest step and change of rate of a joint.
+    fn miss(
+        fallback: &Fallback,
+        state: &mut FallbackState,
+        last: &mut JointCommand,
+        ticks: core::ops::Range<u64>,
+    ) -> (f64, f64) {
+        let (mut step, mut jolt): (f64, f64) = (0.0, 0.0);
+        for tick in ticks {
+            let next = fallback.miss(state, tick, *last, last);
+            step = step.max(largest(&next.joint_position_ref_rad, &last.joint_position_ref_rad));
+            jolt = jolt.max(largest(&next.joint_velocity_ref_rad_s, &last.joint_velocity_ref_rad_s));
+            *last = next;
+        }
+        (step, jolt)
+    }
+
+    fn largest(some: &ByJoint, others: &ByJoint) -> f64 {
+        some.iter().zip(others).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn drives_play_the_plan_once_commands_are_missing_for_good() {
+        let fallback = fallback();
+        let (mut state, mut last, lost) = after_a_plan(&fallback);
+        let told = last;
+        miss(&fallback, &mut state, &mut last, lost..lost + 4);
+        assert_eq!(last, told, "commands may only be late");
+        let (step, jolt) = miss(&fallback, &mut state, &mut last, lost + 4..lost + 600);
+        assert!(step < 0.01 && jolt < 0.3, "{step} rad in a tick, {jolt} rad/s");
+        // The servo was lost at the first tick that the plan is for: its last part does not matter.
+        assert!(last.joint_position_ref_rad[0].abs() < 1e-6);
+        assert!((last.joint_position_ref_rad[1] - angle(PARTS - 2)).abs() < 1e-6);
+        assert!(largest(&last.joint_velocity_ref_rad_s, &[0.0; MAX_JOINTS]) < 1e-6);
+        assert_eq!(last.closed_hands, told.closed_hands);
+    }
+
+    #[test]
+    fn the_later_the_loss_the_more_of_the_last_part_applies() {
+        let fallback = fallback();
+        let (mut state, mut last, lost) = after_a_plan(&fallback);
+        for tick in lost..lost + PARTS / 2 {
+            last = fallback.hear(&mut state, tick, &command(tick - lost), &last);
+        }
+        miss(&fallback, &mut state, &mut last, lost + PARTS / 2..lost + 600);
+        assert!((last.joint_position_ref_rad[1] - angle(PARTS - 2) - 0.05).abs() < 1e-6);
+    }
+
+    #[test]
+    fn without_a_plan_drives_stay_where_they_are() {
+        let fallback = fallback();
+        let (mut state, mut last, lost) = after_a_plan(&fallback);
+        last = fallback.hear(&mut state, lost, &JointCommand { fallback_part: 0, ..command(0) }, &last);
+        let told = last;
+        miss(&fallback, &mut state, &mut last, lost + 1..lost + 100);
+        assert_eq!(last, told);
+    }
+
+    #[test]
+    fn a_servo_that_comes_back_takes_over_without_a_jump_and_is_then_heard_to_the_letter() {
+        let fallback = fallback();
+        let (mut state, mut last, lost) = after_a_plan(&fallback);
+        miss(&fallback, &mut state, &mut last, lost..lost + 200);
+        assert!(last.joint_position_ref_rad[1] > 0.3, "it has come far");
+        let (mut step, mut jolt): (f64, f64) = (0.0, 0.0);
+        for tick in lost + 200..lost + 800 {
+            let next = fallback.hear(&mut state, tick, &command(0), &last);
+            step = step.max(largest(&next.joint_position_ref_rad, &last.joint_position_ref_rad));
+            jolt = jolt.max(largest(&next.joint_velocity_ref_rad_s, &last.joint_velocity_ref_rad_s));
+            last = next;
+        }
+        assert!(step < 0.02 && jolt < 0.5, "{step} rad in a tick, {jolt} rad/s");
+        assert_eq!(bytemuck::bytes_of(&last), bytemuck::bytes_of(&command(0)));
+    }
+
+    #[test]
+    fn drives_are_never_told_to_go_beyond_a_limit() {
+        let fallback = fallback();
+        let (mut state, mut last, lost) = after_a_plan(&fallback);
+        last.joint_position_ref_rad[1] = 1.99;
+        last.joint_velocity_ref_rad_s[1] = 3.0;
+        for tick in lost..lost + 600 {
+            last = fallback.miss(&mut state, tick, last, &last);
+            assert!(last.joint_position_ref_rad[1] <= LIMITS[1][1], "{}", last.joint_position_ref_rad[1]);
+        }
+    }
+}

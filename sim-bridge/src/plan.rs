@@ -128,3 +128,96 @@ impl Plan {
         self.position_rad.get(knot).and_then(|position| position.get(joint)).copied().unwrap_or_default()
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) const BEGIN: u64 = 1000;
+    const SPACING: u64 = 14;
+    pub(crate) const LIMITS: [[f64; 2]; 2] = [[-2.0, 2.0]; 2];
+
+    /// Joint 1 turns by a radian from one end of the plan to the other.
+    pub(crate) fn angle(knot: u64) -> f64 {
+        let s = knot as f64 / (KNOTS - 1) as f64;
+        s * s * (3.0 - 2.0 * s)
+    }
+
+    /// What comes with the commands of a plan; its last part says that joint 1 is .1 rad farther.
+    pub(crate) fn part(index: u64) -> JointCommand {
+        let mut command = JointCommand::zeroed();
+        let knot = index.min(PARTS - 2);
+        command.fallback_part = index + 1;
+        command.fallback_ahead_ticks = PARTS + SPACING * knot - index;
+        command.fallback_position_rad[1] = angle(knot) + if index + 1 == PARTS { 0.1 } else { 0.0 };
+        command
+    }
+
+    fn heard(spoil: impl Fn(u64, &mut u64, &mut JointCommand)) -> Plan {
+        let mut plan = Plan::zeroed();
+        for index in 0..PARTS {
+            let (mut tick, mut command) = (BEGIN + index, part(index));
+            spoil(index, &mut tick, &mut command);
+            plan.hear(tick, &command, &LIMITS);
+        }
+        plan
+    }
+
+    #[test]
+    fn a_plan_leads_smoothly_through_its_knots_and_ends_at_rest() {
+        let plan = heard(|_, _, _| ());
+        assert!(plan.is_whole());
+        let first = BEGIN + PARTS;
+        for knot in 0..PARTS - 1 {
+            let (found, _) = plan.at(first + SPACING * knot, 1);
+            assert!((found - angle(knot)).abs() < 1e-12, "knot {knot}: {found}");
+        }
+        let last = first + SPACING * (PARTS - 2);
+        for tick in first..last + 20 {
+            let ((here, rate), (next, next_rate)) = (plan.at(tick, 1), plan.at(tick + 1, 1));
+            assert!((next - here - (rate + next_rate) / 2.0).abs() < 2e-5, "at {tick}");
+            assert!((next_rate - rate).abs() < 4e-4, "at {tick}: {rate} to {next_rate}");
+        }
+        assert_eq!(plan.at(last + 1000, 1), (1.0, 0.0));
+        assert_eq!(plan.at(last, 0), (0.0, 0.0));
+        assert!((plan.late_offset(1) - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_plan_is_for_the_ticks_after_it_and_a_cycle_more() {
+        let plan = heard(|_, _, _| ());
+        let first = BEGIN + PARTS;
+        let found =
+            [first - 1, first, first + 2 * PARTS - 1, first + 2 * PARTS].map(|tick| plan.is_for(tick));
+        assert_eq!(found, [false, true, true, false]);
+        assert_eq!(plan.lateness(first + PARTS / 2), 0.5);
+        assert!(!Plan::zeroed().is_for(0) && !Plan::zeroed().is_for(PARTS));
+    }
+
+    #[test]
+    fn a_plan_that_can_not_be_is_none() {
+        type Spoil = fn(&mut u64, &mut JointCommand);
+        let spoils: [(&str, Spoil); 8] = [
+            ("a joint beyond its limit", |_, command| command.fallback_position_rad[1] = 2.1),
+            ("an angle that is none", |_, command| command.fallback_position_rad[0] = f64::NAN),
+            ("a knot before the last one", |_, command| command.fallback_ahead_ticks = 1),
+            ("a knot that never comes", |_, command| command.fallback_ahead_ticks = u64::MAX),
+            ("a part that does not follow", |_, command| command.fallback_part += 1),
+            ("a part that can't be", |_, command| command.fallback_part = u64::MAX),
+            ("no part", |_, command| command.fallback_part = 0),
+            ("a tick that is missing", |tick, _| *tick += 1),
+        ];
+        for (what, spoil) in spoils {
+            for spoilt in [1, 7, PARTS - 1] {
+                let plan = heard(|index, tick, command| {
+                    if index == spoilt {
+                        spoil(tick, command);
+                    }
+                });
+                assert!(!plan.is_whole(), "{what}, part {spoilt}");
+            }
+        }
+        let late = heard(|index, _, command| command.fallback_ahead_ticks += u64::from(index == 0));
+        assert!(!late.is_whole(), "it does not cover the tick after its last part");
+    }
+}

@@ -22,6 +22,7 @@ use mikoshi_humanoid::ik::ConfigureIkError;
 use mikoshi_humanoid::{IkScratch, IkState, IkTargets, WholeBodyIk};
 use mikoshi_ipc_types::{FALLBACK_PARTS, JointCommand, MAX_HANDS};
 use mikoshi_spatial::{Hand, Pose, Twist, World};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 const PARTS: u64 = FALLBACK_PARTS as u64;
@@ -51,9 +52,18 @@ pub(crate) struct FallbackState {
     spacing_ticks: u64,
     legs: Foresight,
     ik: IkState,
-    /// At the plan's beginning: where hands are to be, and how they move.
-    hands: [Option<(Pose<World, Hand>, Twist<World>)>; MAX_HANDS],
+    /// At the plan's beginning.
+    hands: [Option<MovingHand>; MAX_HANDS],
     centre: Option<HandCentre>,
+}
+
+/// Where a hand is to be, and how it moves with the object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct MovingHand {
+    pose: Pose<World, Hand>,
+    twist: Twist<World>,
+    /// Change of the twist \[m/s² and rad/s²\].
+    acceleration: Twist<World>,
 }
 
 impl Fallback {
@@ -100,16 +110,20 @@ impl Fallback {
             return;
         }
         let (legs, legs_state) = legs;
+        let before = state.hands;
         *state = FallbackState { part: 0, ..self.none(legs, legs_state, ik) };
         state.centre = legs_state.hand_centre;
-        let mut coasting_s: f64 = 0.0;
-        for (own, hand) in state.hands.iter_mut().zip(hands) {
-            *own = Some((hand.pose, hand.twist));
-            let [linear_s, angular_s] = self.seconds_to_stop(&hand.twist);
-            coasting_s = coasting_s.max(linear_s).max(angular_s);
+        let mut braking_s: f64 = 0.0;
+        for ((own, hand), before) in state.hands.iter_mut().zip(hands).zip(before) {
+            let acceleration =
+                before.map_or_else(Twist::zero, |before| self.acceleration(&before.twist, &hand.twist));
+            *own = Some(MovingHand { pose: hand.pose, twist: hand.twist, acceleration });
+            let [linear, angular] = self.deceleration;
+            braking_s =
+                braking_s.max(hand.twist.linear.norm() / linear).max(hand.twist.angular.norm() / angular);
         }
         // What slows down for longer than legs take has its knots farther apart.
-        let ticks = self.braking_ticks + (coasting_s.min(MOST_REST_S) / self.period_s).ceil() as u64;
+        let ticks = self.braking_ticks + (braking_s.min(MOST_REST_S) / self.period_s).ceil() as u64;
         state.spacing_ticks = state.spacing_ticks.max(ticks.saturating_sub(PARTS).div_ceil(PARTS - 2));
     }
 
@@ -142,9 +156,7 @@ impl Fallback {
             feet: targets.feet,
             com: targets.com,
             waist_attitude: targets.waist_attitude,
-            hands: state
-                .hands
-                .map(|hand| hand.map(|(pose, twist)| self.hand(&pose, &twist, until, late_ticks))),
+            hands: state.hands.map(|hand| hand.map(|hand| self.hand(&hand, until, late_ticks))),
         };
         if self.ik.solve(&robot.model, &mut state.ik, scratch, &targets).is_err() {
             state.part = NO_PART;
@@ -156,31 +168,45 @@ impl Fallback {
         out.fallback_part = state.part;
     }
 
+    /// How a twist changes that was `before` when the last plan began, if that is how an object changes its motion.
+    fn acceleration(&self, before: &Twist<World>, now: &Twist<World>) -> Twist<World> {
+        let [linear, angular] = self.deceleration;
+        let change = (*now - *before) * (1.0 / (PARTS as f64 * self.period_s));
+        let bounded = |change: Vector3<f64>, most: f64| {
+            if most.is_finite() { change.cap_magnitude(most) } else { Vector3::zeros() }
+        };
+        Twist::new(bounded(change.linear, linear), bounded(change.angular, angular))
+    }
+
     /// A hand so many ticks on, where the loss comes `late_ticks` after the first tick that the plan is for: it has
-    /// gone on, and then slowed down.
-    fn hand(
-        &self,
-        pose: &Pose<World, Hand>,
-        twist: &Twist<World>,
-        ticks: u64,
-        late_ticks: u64,
-    ) -> Pose<World, Hand> {
+    /// gone on as it did, and then slowed down.
+    fn hand(&self, hand: &MovingHand, ticks: u64, late_ticks: u64) -> Pose<World, Hand> {
         let seconds = |ticks: u64| ticks as f64 * self.period_s;
         let going_on_s = seconds(ticks.min(self.braking_ticks) + late_ticks);
         let braking_s = seconds(ticks.saturating_sub(self.braking_ticks));
-        // As long at the full speed as it takes for the same way.
-        let [linear_s, angular_s] = self.seconds_to_stop(twist).map(|stop_s| {
-            let s = braking_s.min(stop_s);
-            going_on_s + if s > 0.0 { s - s * s / (2.0 * stop_s) } else { 0.0 }
-        });
-        pose.displaced(&Twist::new(twist.linear * linear_s, twist.angular * angular_s))
-    }
-
-    /// How long the object takes to stand that goes with a hand which moves like that.
-    fn seconds_to_stop(&self, twist: &Twist<World>) -> [f64; 2] {
+        let MovingHand { pose, twist, acceleration } = hand;
         let [linear, angular] = self.deceleration;
-        [twist.linear.norm() / linear, twist.angular.norm() / angular]
+        pose.displaced(&Twist::new(
+            way(&twist.linear, &acceleration.linear, going_on_s, linear, braking_s),
+            way(&twist.angular, &acceleration.angular, going_on_s, angular, braking_s),
+        ))
     }
+}
+
+/// What is travelled at the velocity v, which changes by a, in `going_on_s`, and then in `braking_s`, in which the
+/// speed falls at `deceleration` to zero.
+fn way(
+    v: &Vector3<f64>,
+    a: &Vector3<f64>,
+    going_on_s: f64,
+    deceleration: f64,
+    braking_s: f64,
+) -> Vector3<f64> {
+    let velocity = v + a * going_on_s;
+    let stop_s = velocity.norm() / deceleration;
+    let s = braking_s.min(stop_s);
+    let slowing = if s > 0.0 { velocity * (s - s * s / (2.0 * stop_s)) } else { Vector3::zeros() };
+    v * going_on_s + a * (going_on_s * going_on_s / 2.0) + slowing
 }
 
 /// A hand that would slow down for longer is not foreseen to the end.
