@@ -70,19 +70,18 @@ fn participant(run: &RunSpec, service: ServiceId, ports: &Deaf) -> Box<dyn Parti
 }
 
 /// A team that walks at this speed.
-fn walk(team: &str, speed_m_s: f64, duration_s: f64, operator: &str) -> RunSpec {
+fn walk(team: &str, speed_m_s: f64, acceleration_m_s2: &str, operator: &str) -> RunSpec {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/transport.toml");
-    let seconds = duration_s.to_string();
     let travel = format!("[{}, 0.05, 0.0]", speed_m_s * 9.0);
     let overrides = [
         ("team", team),
         ("safety.operator", operator),
-        ("duration_s", &seconds),
+        ("duration_s", "11.0"),
         ("motion.start_s", "1.5"),
         ("motion.random.duration_s", "9.0"),
         ("motion.random.travel_m", &travel),
         ("motion.random.travel_rad", "[0.0, 0.0, 0.05]"),
-        ("motion.acceleration_m_s2", &std::env::var("ACCELERATION").unwrap_or_else(|_| "0.05".to_owned())),
+        ("motion.acceleration_m_s2", acceleration_m_s2),
     ];
     let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_owned()));
     resolve(&load_scenario(&scenario, &overrides, None).expect("a scenario")).expect("a run")
@@ -123,7 +122,6 @@ fn fate(run: &RunSpec, lost: usize, from: u64, silence: impl Fn(Topic, u64) -> b
     let mut fate = Fate { margin_min_m: f64::INFINITY, ..Fate::default() };
     let (mut height_m, mut strain, mut samples) = (None, vec![[0.0; 3]; run.robots.len()], 0.0);
     let mut position_before = [0.0; 3];
-    let trace = std::env::var("TRACE").is_ok();
     let ended = run_in_one_thread(&schedule, &mut participants, run.ticks, |tick| {
         assert_eq!(tap.try_take_tick(&mut seen), Ok(true));
         let team = &seen.team_state.payload;
@@ -173,21 +171,6 @@ fn fate(run: &RunSpec, lost: usize, from: u64, silence: impl Fn(Topic, u64) -> b
         fate.foot_height_end_m = right[2].max(left[2]);
         let [right_n, left_n] = [robot.ground_wrench[0][2], robot.ground_wrench[1][2]];
         fate.foot_share_end = right_n.min(left_n) / (right_n + left_n).max(1.0);
-        if trace {
-            println!(
-                "T {tick} {} {} {} {right_n} {left_n} {} {} {} {} {} {} {}",
-                robot.zmp_margin_m,
-                right[2],
-                left[2],
-                net[lost][0] - mean[0],
-                net[lost][1] - mean[1],
-                net[lost][2] - mean[2],
-                robot.com_position_m[0],
-                robot.com_position_m[1],
-                robot.tilt_rad,
-                object.pose[0],
-            );
-        }
         ControlFlow::Continue(())
     });
     assert_eq!(ended, Ok(run.ticks), "{fate:?}");
@@ -217,7 +200,7 @@ fn expect_a_stand(fate: &Fate, from: u64, lost: usize) {
 
 #[test]
 fn a_robot_whose_servo_is_lost_in_whatever_phase_of_a_step_stands_on_both_feet_with_its_team() {
-    let run = walk("four", 0.04, 11.0, "[]");
+    let run = walk("four", 0.04, "0.05", "[]");
     for eighth in 0..8 {
         let (from, lost) = (WALKING + eighth * STEP / 8, eighth as usize % 4);
         let fate = fate(&run, lost, from, move |topic, tick| tick >= from && is_of_servo(topic, lost));
@@ -229,7 +212,7 @@ fn a_robot_whose_servo_is_lost_in_whatever_phase_of_a_step_stands_on_both_feet_w
 
 #[test]
 fn one_of_two_that_is_lost_at_a_tenth_of_a_metre_per_second_stands_too() {
-    let run = walk("two", 0.1, 11.0, "[]");
+    let run = walk("two", 0.1, "0.5", "[]");
     for eighth in [1, 5] {
         let (from, lost) = (WALKING + eighth * STEP / 8, eighth as usize / 4);
         let fate = fate(&run, lost, from, move |topic, tick| tick >= from && is_of_servo(topic, lost));
@@ -240,7 +223,7 @@ fn one_of_two_that_is_lost_at_a_tenth_of_a_metre_per_second_stands_too() {
 
 #[test]
 fn a_servo_that_comes_back_while_its_plan_is_played_takes_over_and_the_team_goes_on() {
-    let run = walk("four", 0.04, 11.0, "[{ at_s = 9.0, says = \"resume\" }]");
+    let run = walk("four", 0.04, "0.05", "[{ at_s = 9.0, says = \"resume\" }]");
     for eighth in [2, 7] {
         let from = WALKING + eighth * STEP / 8;
         let silent = from..from + 40;
@@ -257,7 +240,7 @@ fn table() {
     let of = |name: &str, default: &str| std::env::var(name).unwrap_or_else(|_| default.to_owned());
     let kind = of("KIND", "lost");
     let (team, speed) = (of("TEAM", "four"), of("SPEED", "0.04").parse().expect("a number"));
-    let run = walk(&team, speed, 11.0, "[]");
+    let run = walk(&team, speed, &of("ACCELERATION", "0.05"), "[]");
     let robots = of("ROBOTS", "0123").bytes().map(|b| usize::from(b - b'0')).collect::<Vec<_>>();
     let eighths = of("EIGHTHS", "01234567").bytes().map(|b| u64::from(b - b'0')).collect::<Vec<_>>();
     for &robot in robots.iter().filter(|&&robot| robot < run.robots.len()) {

@@ -119,7 +119,7 @@ fn for_as_long_as_a_plan_is_for_it_is_what_the_robot_does() {
             compared += 1;
             for joint in 0..joints {
                 let gap = part.fallback_position_rad[joint] - done.joint_position_ref_rad[joint];
-                assert!(gap.abs() < 0.02, "joint {joint} at {at}, foreseen at {begin}: {gap} rad");
+                assert!(gap.abs() < 0.03, "joint {joint} at {at}, foreseen at {begin}: {gap} rad");
             }
         }
     }
