@@ -4,7 +4,8 @@
 use mikoshi_config::{RunSpec, load_scenario};
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::{
-    Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, ServicePayload, TeamCommand, stop_cause,
+    FALLBACK_PARTS, Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, ServicePayload,
+    TeamCommand, stop_cause,
 };
 use mikoshi_observation::{Observation, TeamTap};
 use mikoshi_resolution::{resolve, tick_schedule};
@@ -186,6 +187,38 @@ const STEP: u64 = 160;
 
 fn is_of_servo(topic: Topic, robot: usize) -> bool {
     topic == Topic::of::<RobotState>(robot) || topic == Topic::of::<JointCommand>(robot)
+}
+
+#[test]
+fn for_as_long_as_a_plan_is_for_it_is_what_the_robot_does() {
+    const PARTS: u64 = FALLBACK_PARTS as u64;
+    let run = walk("four", 0.04, "0.05", "[]");
+    let schedule = tick_schedule(&run).expect("a schedule");
+    let (hub, silence): (_, Silence) = (InMemoryHub::new(schedule.clone()), Rc::new(|_, _| false));
+    let ports = |id| Deaf { inner: hub.transport(id), silence: Rc::clone(&silence) };
+    let mut participants: Vec<_> =
+        schedule.services().into_iter().map(|id| participant(&run, id, &ports(id))).collect();
+    let mut tap = TeamTap::new(&hub.tap(), run.robots.len(), Clock::Lockstep).expect("a tap");
+    let mut seen = Observation::for_team(run.robots.len());
+    let mut commands: Vec<JointCommand> = vec![];
+    let ended = run_in_one_thread(&schedule, &mut participants, 1500, |_| {
+        assert_eq!(tap.try_take_tick(&mut seen), Ok(true));
+        commands.push(seen.joint_command[1].payload);
+        ControlFlow::Continue(())
+    });
+    assert_eq!(ended, Ok(1500));
+    let mut gaps_rad = vec![];
+    for (tick, command) in (0..).zip(&commands).skip(WALKING as usize) {
+        let at = tick + command.fallback_ahead_ticks;
+        let is_for_it = at + 1 < tick + 2 * PARTS + 2 - command.fallback_part;
+        let Some(done) = commands.get(at as usize).filter(|_| is_for_it) else { continue };
+        let joints = command.fallback_position_rad.iter().zip(&done.joint_position_ref_rad);
+        gaps_rad.push(joints.map(|(planned, done)| (planned - done).abs()).fold(0.0, f64::max));
+    }
+    // Where the object is asked to move otherwise meanwhile, or a foot lands early, it is not foreseen.
+    gaps_rad.sort_by(f64::total_cmp);
+    assert!(gaps_rad.len() > 40, "{gaps_rad:?}");
+    assert!(gaps_rad[gaps_rad.len() * 9 / 10] < 0.02, "{gaps_rad:?}");
 }
 
 #[track_caller]

@@ -1,4 +1,4 @@
-//! What a robot plans for the loss of its servo: it is what the robot does anyway, and then a stand on both feet.
+//! What a robot plans for the loss of its servo: a stand on both feet.
 
 use bytemuck::Zeroable;
 use mikoshi_config::{RunSpec, load_scenario};
@@ -18,7 +18,9 @@ const SPEED_M_S: f64 = 0.06;
 
 fn run() -> RunSpec {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/transport.toml");
-    let overrides = [("motion.acceleration_m_s2".to_owned(), "0.5".to_owned())];
+    // Feet of this robot do not feel what its weight does, which a stabiliser would answer.
+    let overrides = [("motion.acceleration_m_s2", "0.5"), ("balance.stabiliser", "false")];
+    let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let scenario = load_scenario(&path, &overrides, None).expect("it loads");
     mikoshi_resolution::resolve(&scenario).expect("it resolves")
 }
@@ -100,30 +102,6 @@ fn a_part_of_a_plan_rides_with_each_command_in_order_of_time() {
             before = at;
         }
     }
-}
-
-#[test]
-fn for_as_long_as_a_plan_is_for_it_is_what_the_robot_does() {
-    let commands = walk(&run());
-    let joints = run().robots[0].initial_posture_rad.len();
-    let mut compared = 0;
-    for (begin, parts) in plans(&commands) {
-        let window = (begin as u64 + PARTS..begin as u64 + 2 * PARTS).filter(|&tick| {
-            // Walks and motions begin and end as nobody can foresee.
-            !(100..260).contains(&tick) && !(560..700).contains(&tick)
-        });
-        let window: Vec<u64> = window.collect();
-        for (index, part) in parts.iter().enumerate().take(FALLBACK_PARTS - 1) {
-            let at = begin as u64 + index as u64 + part.fallback_ahead_ticks;
-            let Some(done) = commands.get(at as usize).filter(|_| window.contains(&at)) else { continue };
-            compared += 1;
-            for joint in 0..joints {
-                let gap = part.fallback_position_rad[joint] - done.joint_position_ref_rad[joint];
-                assert!(gap.abs() < 0.03, "joint {joint} at {at}, foreseen at {begin}: {gap} rad");
-            }
-        }
-    }
-    assert!(compared > 20, "{compared}");
 }
 
 #[test]
