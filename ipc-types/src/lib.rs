@@ -22,7 +22,8 @@ mod service;
 pub use envelope::{Envelope, Frame};
 pub use layout::{Audience, Field, Payload, Scalar, ServicePayload, WireType, schema_hash};
 pub use limits::{
-    MAX_COORDINATION_DELAY_TICKS, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS, MAX_ROBOTS,
+    FALLBACK_PARTS, MAX_COORDINATION_DELAY_TICKS, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS,
+    MAX_ROBOTS,
 };
 pub use payloads::{
     JointCommand, ObjectTruth, PoseWire, RobotState, RobotTruth, Sensors, TeamCommand, TeamState, TwistWire,

@@ -248,6 +248,13 @@ payload! {
         pub closed_hands: u64,
         /// One past the tick of the last team command that has arrived; 0 before the first.
         pub next_team_command_tick: u64,
+        /// Which part of the robot's plan for the loss of its servo rides with this command, from 1 on; 0 if it
+        /// has none.
+        pub fallback_part: u64,
+        /// How many ticks after this command's the joints shall be there.
+        pub fallback_ahead_ticks: u64,
+        /// Where: angles in the order of the robot's description.
+        pub fallback_position_rad: [f64; MAX_JOINTS],
     }
 }
 

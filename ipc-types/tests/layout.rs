@@ -78,8 +78,8 @@ fn sizes_follow_from_the_limits() {
     );
     assert_eq!(
         size_of::<JointCommand>(),
-        word * (2 * MAX_JOINTS + 2),
-        "two values by joint, hands to close, tick"
+        word * (3 * MAX_JOINTS + 4),
+        "two values by joint, hands to close, tick; a part of a plan, when, a value by joint"
     );
     assert_eq!(
         size_of::<TeamState>(),

@@ -26,6 +26,11 @@ impl Coast {
         Self { period_s, go_on_ticks, decay: (-period_s / REST_S).exp() }
     }
 
+    /// Whether a command may still come that is only late, after so many ticks in a row without one.
+    pub(crate) fn is_late(&self, missed: u64) -> bool {
+        missed <= self.go_on_ticks
+    }
+
     /// The command one tick after `last`, whose rates came after `rates_before`, where `missed` ticks in a row have
     /// none. Rates go on to change, half as much each tick, q̇ₖ₊₁ = q̇ₖ + ½·(q̇ₖ − q̇ₖ₋₁), and after a while decay,
     /// q̇ₖ₊₁ = q̇ₖ·e^(−T/τ); qₖ₊₁ = qₖ + T·q̇ₖ₊₁.

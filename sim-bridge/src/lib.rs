@@ -17,12 +17,14 @@
 mod coast;
 mod error;
 mod failures;
+mod fallback;
 mod grasp;
 mod grip;
 mod layout;
 mod logging;
 mod mjcf;
 mod participant;
+mod plan;
 mod pose;
 mod random;
 mod readings;

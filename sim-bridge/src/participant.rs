@@ -1,7 +1,10 @@
 //! The bridge on a transport.
 
 use crate::coast::{Coast, Rates};
+use crate::fallback::{Fallback, FallbackState};
+use crate::robot::Robot;
 use crate::{BuildWorldError, World};
+use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{
     Frame, JointCommand, MAX_JOINTS, MAX_ROBOTS, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId,
@@ -13,7 +16,7 @@ use mikoshi_runtime::{
 use thiserror::Error;
 
 /// Of the layout of a world's checkpoint: another one gets another number.
-const STATE_VERSION: u64 = 3;
+const STATE_VERSION: u64 = 4;
 
 /// Why a bridge could not be made.
 #[derive(Debug, Error)]
@@ -42,6 +45,8 @@ pub struct BridgeParticipant<T: Transport> {
     /// Of each robot, in the tick before the last.
     rates_before: [Rates; MAX_ROBOTS],
     coast: Coast,
+    fallbacks: Vec<Fallback>,
+    fallback_states: Vec<FallbackState>,
     robots: Vec<RobotPorts<T>>,
     object_truth: T::Publisher<ObjectTruth>,
 }
@@ -65,6 +70,13 @@ impl<T: Transport> BridgeParticipant<T> {
                 command: transport.subscriber(robot)?,
             })
         };
+        let period_s = run.scenario.control_period_s;
+        let fallback = |spec| {
+            let joints = Robot::resolve(spec)?.model;
+            let limits = joints.joints().iter().map(|joint| [joint.lower, joint.upper]);
+            Ok(Fallback::new(period_s, limits.collect()))
+        };
+        let fallbacks = run.robots.iter().map(fallback).collect::<Result<Vec<_>, BuildWorldError>>()?;
         let robots = (0..run.robots.len()).map(ports).collect::<Result<Vec<_>, ConnectError>>()?;
         let frame = Frame::zeroed();
         Ok(Self {
@@ -72,7 +84,9 @@ impl<T: Transport> BridgeParticipant<T> {
             commands: vec![frame.payload; robots.len()],
             next_command_tick: [0; MAX_ROBOTS],
             rates_before: [[0.0; MAX_JOINTS]; MAX_ROBOTS],
-            coast: Coast::of_period(run.scenario.control_period_s),
+            coast: Coast::of_period(period_s),
+            fallback_states: vec![FallbackState::zeroed(); robots.len()],
+            fallbacks,
             frame,
             robots,
             object_truth: transport.publisher(0)?,
@@ -105,25 +119,30 @@ impl<T: Transport> BridgeParticipant<T> {
     fn step(&mut self, tick: u64) -> Result<(), TickError> {
         let mut rejected = 0;
         let heard = self.commands.iter_mut().zip(&mut self.next_command_tick).zip(&mut self.rates_before);
-        let robots = self.robots.iter_mut().zip(heard).zip(self.world.commands());
-        for (robot, ((ports, ((command, next_tick), rates_before)), last)) in robots.enumerate() {
+        let fallbacks = self.fallbacks.iter().zip(&mut self.fallback_states);
+        let robots = self.robots.iter_mut().zip(heard).zip(fallbacks).zip(self.world.commands());
+        for (robot, (((ports, heard), (fallback, state)), last)) in robots.enumerate() {
+            let ((command, next_tick), rates_before) = heard;
             let received = ports.command.receive(tick, &mut self.frame);
             if matches!(received, Ok(()) | Err(TickError::NotFinite { .. })) {
                 *next_tick = tick + 1;
             }
-            match received {
-                Ok(()) if is_credible(&self.frame.payload, last) => *command = self.frame.payload,
+            *command = match received {
+                Ok(()) if is_credible(&self.frame.payload, last) => {
+                    fallback.hear(state, tick, &self.frame.payload, last)
+                }
                 // Drives hold what they were told last.
                 Ok(()) | Err(TickError::NotFinite { .. }) => {
-                    *command = JointCommand { joint_velocity_ref_rad_s: [0.0; MAX_JOINTS], ..*last };
                     rejected |= 1 << robot;
+                    let hold = JointCommand { joint_velocity_ref_rad_s: [0.0; MAX_JOINTS], ..*last };
+                    fallback.miss(state, tick, hold, last)
                 }
                 Err(TickError::InputMissing { .. }) => {
                     let missed = (tick + 1).saturating_sub(*next_tick);
-                    *command = self.coast.after(last, rates_before, missed);
+                    fallback.miss(state, tick, self.coast.after(last, rates_before, missed), last)
                 }
                 Err(error) => return Err(error),
-            }
+            };
             *rates_before = last.joint_velocity_ref_rad_s;
         }
         self.world.note_rejected(rejected);
@@ -182,7 +201,10 @@ impl<T: Transport> Replaceable for BridgeParticipant<T> {
     }
 
     fn state_bytes(&self) -> usize {
-        size_of_val(&self.next_command_tick) + size_of_val(&self.rates_before) + self.world.checkpoint_size()
+        size_of_val(&self.next_command_tick)
+            + size_of_val(&self.rates_before)
+            + size_of_val(self.fallback_states.as_slice())
+            + self.world.checkpoint_size()
     }
 
     fn save(&mut self, checkpoint: &mut [u8]) -> Result<usize, TickError> {
@@ -203,10 +225,11 @@ impl<T: Transport> Replaceable for BridgeParticipant<T> {
 
 impl<T: Transport> BridgeParticipant<T> {
     /// What a checkpoint holds beside the world.
-    fn parts(&mut self) -> [&mut [u8]; 2] {
+    fn parts(&mut self) -> [&mut [u8]; 3] {
         [
             bytemuck::cast_slice_mut(&mut self.next_command_tick),
             bytemuck::cast_slice_mut(&mut self.rates_before),
+            bytemuck::cast_slice_mut(&mut self.fallback_states),
         ]
     }
 }

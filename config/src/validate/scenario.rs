@@ -317,8 +317,8 @@ fn motion(checks: &mut Checks, motion: &Motion, scenario: &Scenario) {
     for (index, segment) in motion.segments.iter().enumerate() {
         let key = format!("motion.segments.{index}");
         checks.positive(format_args!("{key}.duration_s"), segment.duration_s);
-        checks.finite_numbers(&format!("{key}.velocity_m_s"), &segment.velocity_m_s);
-        checks.finite_numbers(&format!("{key}.angular_velocity_rad_s"), &segment.angular_velocity_rad_s);
+        speeds(checks, &format!("{key}.velocity_m_s"), segment.velocity_m_s);
+        speeds(checks, &format!("{key}.angular_velocity_rad_s"), segment.angular_velocity_rad_s);
     }
     if let Some(random) = &motion.random {
         checks.positive("motion.random.duration_s", random.duration_s);
@@ -326,14 +326,26 @@ fn motion(checks: &mut Checks, motion: &Motion, scenario: &Scenario) {
         let count = whole_ratio(random.duration_s, random.change_s);
         let expected = format!("a whole number of motion.random.change_s ({} s)", random.change_s);
         checks.require(count.is_some(), "motion.random.duration_s", random.duration_s, expected);
-        checks.finite_numbers("motion.random.travel_m", &random.travel_m);
-        checks.finite_numbers("motion.random.travel_rad", &random.travel_rad);
-        checks.finite_numbers("motion.random.deviation_m_s", &random.deviation_m_s);
-        checks.finite_numbers("motion.random.deviation_rad_s", &random.deviation_rad_s);
+        for (key, travel) in [("travel_m", random.travel_m), ("travel_rad", random.travel_rad)] {
+            let (limit, key) = (FASTEST * random.duration_s, format!("motion.random.{key}"));
+            let is_slow = travel.iter().all(|travel| travel.abs() <= limit);
+            let expected = format!("at most {limit} in motion.random.duration_s");
+            checks.require(is_slow, key, format_args!("{travel:?}"), expected);
+        }
+        speeds(checks, "motion.random.deviation_m_s", random.deviation_m_s);
+        speeds(checks, "motion.random.deviation_rad_s", random.deviation_rad_s);
     }
     let (end_s, duration_s) = (motion.end_s(), scenario.duration_s);
     let expected = format!("a motion that ends before the run does ({duration_s} s)");
     checks.require(end_s <= duration_s, "motion", format_args!("one that ends at {end_s} s"), expected);
+}
+
+/// No object that robots carry moves faster, in metres or radians per second.
+const FASTEST: f64 = 10.0;
+
+fn speeds(checks: &mut Checks, key: &str, speeds: [f64; 3]) {
+    let is_slow = speeds.iter().all(|speed| speed.abs() <= FASTEST);
+    checks.require(is_slow, key, format_args!("{speeds:?}"), format!("numbers of at most {FASTEST}"));
 }
 
 fn thresholds(checks: &mut Checks, scenario: &Scenario) {

@@ -93,11 +93,10 @@ fn whatever_configuration_and_urdf_say_there_is_a_run_or_an_error() {
                     refused += 1;
                 }
                 // What it accepts it can also write and read.
-                Ok(run) => assert_eq!(
-                    RunSpec::decode(&run.encode()).ok().as_ref(),
-                    Some(&run),
-                    "{part}, seed {seed}"
-                ),
+                Ok(run) => {
+                    let read = RunSpec::decode(&run.encode());
+                    assert!(read.is_ok_and(|read| read == run), "{part}, seed {seed}");
+                }
             }
         }
         fs::write(&path, whole).expect("it can be written");

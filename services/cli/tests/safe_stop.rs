@@ -320,23 +320,6 @@ fn is_of_servo(topic: Topic, robot: usize) -> bool {
     topic == Topic::of::<RobotState>(robot) || topic == Topic::of::<JointCommand>(robot)
 }
 
-#[test]
-fn a_servo_that_is_lost_stops_the_team_in_whatever_phase_of_a_step_and_nobody_falls() {
-    for eighth in 0..8 {
-        let from = WALKING + eighth * STEP / 8;
-        for robot in [1, 2] {
-            let fate =
-                fate_in_silence(&walk("[]"), move |topic, tick| tick >= from && is_of_servo(topic, robot));
-            let (tick, cause, of) = fate.stop.expect("the team has stopped");
-            assert!((from..from + 20).contains(&tick), "{fate:?}");
-            assert_eq!((cause, of), (stop_cause::STALE, robot as u64 + 1), "{fate:?}");
-            // Its drives hold, perhaps on one foot: it leans on the object, and the others bear that.
-            assert!(fate.fell == 0 && fate.sunk_m < 0.02, "{fate:?}");
-            assert!(fate.tilt_max_rad < 0.1 && fate.hand_force_max_n < 150.0, "{fate:?}");
-        }
-    }
-}
-
 /// Ticks of a step.
 const STEP: u64 = 160;
 

@@ -23,6 +23,7 @@ pub struct CoordinatorParticipant<T: Transport> {
     robot_states: Vec<RobotState>,
     /// One past the tick of the last state of each robot that has arrived; 0 before the first.
     next_state_tick: [u64; MAX_ROBOTS],
+    stale_limit_ticks: u64,
     robot_state_ports: Vec<T::Subscriber<RobotState>>,
     command_ports: Vec<T::Publisher<TeamCommand>>,
     team_state_port: T::Publisher<TeamState>,
@@ -44,6 +45,7 @@ impl<T: Transport> CoordinatorParticipant<T> {
             arrived: Frame::zeroed(),
             robot_states: vec![RobotState::zeroed(); run.robots.len()],
             next_state_tick: [0; MAX_ROBOTS],
+            stale_limit_ticks: run.scenario.safety.stale_limit_ticks,
             robot_state_ports: robots.clone().map(|r| transport.subscriber(r)).collect::<Result<_, _>>()?,
             command_ports: robots.map(|r| transport.publisher(r)).collect::<Result<_, _>>()?,
             team_state_port: transport.publisher(0)?,
@@ -70,6 +72,12 @@ impl<T: Transport> CoordinatorParticipant<T> {
                 }
                 Ok(()) => return Err(TickError::Service("a robot says what can't be")),
                 // It is taken to be where it was last seen.
+                // Nobody waits for the wishes of a robot that is lost.
+                Err(TickError::InputMissing { .. })
+                    if tick.saturating_sub(*next_tick) >= self.stale_limit_ticks && tick > 0 =>
+                {
+                    believed.flags = flag::INPUT_MISSING | flag::CAN_STOP | flag::READY_TO_STEP;
+                }
                 Err(TickError::InputMissing { .. }) if tick > 0 => believed.flags |= flag::INPUT_MISSING,
                 Err(error) => return Err(error),
             }

@@ -22,13 +22,13 @@ const PLANNED_CONTACT_M: f64 = 0.002;
 /// Gait and stabiliser of one robot. Immutable.
 #[derive(Clone, Debug)]
 pub(crate) struct Legs {
-    gait: Gait,
+    pub gait: Gait,
     /// Absent where the scenario turns it off.
     stabiliser: Option<Stabiliser>,
-    sole_tracking: SoleTracking,
+    pub sole_tracking: SoleTracking,
     /// The robot as an inverted pendulum.
     pub pendulum: Pendulum,
-    period_s: f64,
+    pub period_s: f64,
     /// Attitude of the waist over feet with heading 0.
     waist_over_feet: UnitQuaternion<f64>,
 }
@@ -36,15 +36,15 @@ pub(crate) struct Legs {
 /// All of it that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LegsState {
-    gait: GaitState,
+    pub gait: GaitState,
     stabiliser: StabiliserState,
-    sole_correction: SoleCorrection,
+    pub sole_correction: SoleCorrection,
     /// How much of the base's estimate rests on each foot, 0 to 1.
     trust: PerFoot<f64>,
     /// Base as the last tick's command has it.
     pub base_commanded: Pose<World, Base>,
     /// Of the hands' references in the last command.
-    hand_centre: Option<HandCentre>,
+    pub hand_centre: Option<HandCentre>,
     /// Steps taken.
     pub steps: u64,
 }
@@ -224,12 +224,23 @@ impl Legs {
             stabilisation.map_or(soles[side], |stabilisation| stabilisation.apply(side, &soles[side]))
         });
         let com_offset = stabilisation.map_or_else(Vector2::zeros, |stabilisation| stabilisation.com_offset);
-        // As soles are commanded and not where footholds are, which move when a foot lands: the waist would jerk.
+        self.targets(&next, &soles, &feet, com_offset)
+    }
+
+    /// Of a reference, with soles as they are commanded and, beside that, stabilised; the waist looks where soles
+    /// do and not where footholds are, which move when a foot lands: it would jerk.
+    pub(crate) fn targets(
+        &self,
+        reference: &GaitReference,
+        soles: &PerFoot<Pose<World, Foot>>,
+        stabilised: &PerFoot<Pose<World, Foot>>,
+        com_offset: Vector2<f64>,
+    ) -> LegTargets {
         let on_ground = PerFoot::from_fn(|side| GroundPose::of(&soles[side]));
         LegTargets {
-            stance: next.stance,
-            feet,
-            com: next.com + com_offset.push(0.0),
+            stance: reference.stance,
+            feet: *stabilised,
+            com: reference.com + com_offset.push(0.0),
             waist_attitude: yawed(mean_yaw(&on_ground)) * self.waist_over_feet,
         }
     }
@@ -282,7 +293,7 @@ impl Legs {
     }
 
     /// What a foot bears that is where this reference has it: the ground comes where the plane is.
-    fn foot_force_as_planned(&self, foot: &Pose<World, Foot>) -> f64 {
+    pub(crate) fn foot_force_as_planned(&self, foot: &Pose<World, Foot>) -> f64 {
         if foot.translation.z <= PLANNED_CONTACT_M { self.pendulum.weight_n() } else { 0.0 }
     }
 

@@ -10,6 +10,8 @@
 
 mod coast;
 mod credible;
+mod fallback;
+mod foresight;
 mod legs;
 mod participant;
 mod robot;

@@ -3,6 +3,7 @@
 
 use crate::coast;
 use crate::credible;
+use crate::fallback::{Fallback, FallbackState};
 use crate::legs::{Felt, HandReference, Legs, LegsState};
 use crate::robot::{BuildRobotError, Robot};
 use mikoshi_config::RunSpec;
@@ -31,13 +32,14 @@ const HAND_TOLERANCE_M: f64 = 0.005;
 pub struct Servo {
     robot: Robot,
     legs: Legs,
+    fallback: Fallback,
     period_s: f64,
     initial: ServoState,
 }
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 5;
+pub(crate) const STATE_VERSION: u64 = 6;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,6 +55,7 @@ pub struct ServoState {
     flags: u64,
     /// Of the last command: bit h for grasping hand h.
     closed_hands: u64,
+    fallback: FallbackState,
 }
 
 /// Workspaces: filled with NaN between ticks they change nothing.
@@ -99,8 +102,11 @@ impl Servo {
             *array = kinematics.frame_pose::<Hand>(&robot.model, palm).to_array();
         }
         let (legs, legs_state) = Legs::new(run, index, &robot, &kinematics, &X_WB)?;
+        let fallback = Fallback::new(&run.scenario, &robot, &legs)?;
+        let ik = IkState::at_rest(&spec.initial_posture_rad);
         let initial = ServoState {
-            ik: IkState::at_rest(&spec.initial_posture_rad),
+            fallback: fallback.none(&legs, &legs_state, &ik),
+            ik,
             base: robot.base_estimator.start(&robot.model, &X_WB, &spec.initial_posture_rad),
             legs: legs_state,
             felt: Some(Felt {
@@ -117,7 +123,7 @@ impl Servo {
             flags: 0,
             closed_hands: if run.scenario.begins_closed() { all_hands(robot.palms.len()) } else { 0 },
         };
-        Ok(Self { robot, legs, period_s: run.scenario.control_period_s, initial })
+        Ok(Self { robot, legs, fallback, period_s: run.scenario.control_period_s, initial })
     }
 
     /// The state at tick 0.
@@ -290,7 +296,9 @@ impl Servo {
         if let Some(command) = command.filter(|command| command.team_mode != mode::HOLD) {
             // The state changes only when nothing can fail any more.
             let (mut legs, mut ik) = (state.legs, state.ik);
-            let targets = self.targets(&mut legs, state.felt.as_ref(), command)?;
+            let hands = self.hand_references(command)?;
+            let hands = hands.get(..self.robot.palms.len()).unwrap_or(&hands);
+            let targets = self.targets(&mut legs, state.felt.as_ref(), command, hands)?;
             let report = self
                 .robot
                 .ik
@@ -298,6 +306,8 @@ impl Servo {
                 .map_err(|_| ServoError::InverseKinematics)?;
             (state.legs, state.ik) = (legs, ik);
             self.remember(state, &report);
+            self.fallback.begin(&mut state.fallback, (&self.legs, &state.legs), &state.ik, hands);
+            self.fallback.go_on(&mut state.fallback, &self.legs, &self.robot, &mut scratch.ik, out);
         }
         out.joint_position_ref_rad = state.ik.joint_position;
         out.joint_velocity_ref_rad_s = state.ik.joint_velocity;
@@ -306,29 +316,34 @@ impl Servo {
         Ok(())
     }
 
+    fn hand_references(&self, command: &TeamCommand) -> Result<[HandReference; MAX_HANDS], ServoError> {
+        let mut references = [HandReference::default(); MAX_HANDS];
+        let motions = command.hand_twist_ref.iter().zip(&command.hand_wrench_ref);
+        let asked = references.iter_mut().zip(&command.hand_pose_ref).zip(motions);
+        for ((reference, pose), (twist, wrench)) in asked.take(self.robot.palms.len()) {
+            let pose = Pose::<World, Hand>::from_array(pose).ok_or(ServoError::HandReference)?;
+            let (twist, wrench) = (Twist::from_array(twist), Wrench::from_array(wrench));
+            *reference = HandReference { pose, twist, wrench };
+        }
+        Ok(references)
+    }
+
     fn targets(
         &self,
         legs: &mut LegsState,
         felt: Option<&Felt>,
         command: &TeamCommand,
+        references: &[HandReference],
     ) -> Result<IkTargets, ServoError> {
         let clock = StepClock::from_words(command.step_clock).ok_or(ServoError::StepClock)?;
-        let count = self.robot.palms.len().min(MAX_HANDS);
         let mut hands = [None; MAX_HANDS];
-        let mut references = [HandReference::default(); MAX_HANDS];
-        let poses = hands.iter_mut().zip(&mut references).zip(&command.hand_pose_ref);
-        let motions = command.hand_twist_ref.iter().zip(&command.hand_wrench_ref);
-        for (((target, reference), pose), (twist, wrench)) in poses.zip(motions).take(count) {
-            let pose = Pose::<World, Hand>::from_array(pose).ok_or(ServoError::HandReference)?;
-            *target = Some(pose);
-            let (twist, wrench) = (Twist::from_array(twist), Wrench::from_array(wrench));
-            *reference = HandReference { pose, twist, wrench };
+        for (target, reference) in hands.iter_mut().zip(references) {
+            *target = Some(reference.pose);
         }
         // Open hands carry nothing, and the feet need not follow them.
         let is_stopped_holding = command.team_mode == mode::SAFE_STOP && command.closed_hands != 0;
         let holds = mode::is_hybrid(command.team_mode) || is_stopped_holding;
-        let grasping = if holds { references.get(..count) } else { None };
-        let grasping = grasping.unwrap_or_default();
+        let grasping = if holds { references } else { Default::default() };
         let legs = self.legs.act(legs, clock, grasping, felt);
         Ok(IkTargets {
             stance: legs.stance,

@@ -5,7 +5,7 @@
 use bytemuck::Zeroable;
 use mikoshi_config::{RobotSpec, RunSpec, load_scenario};
 use mikoshi_humanoid::{Kinematics, Model};
-use mikoshi_ipc_types::{JointCommand, MAX_JOINTS, ObjectTruth, PoseWire, RobotTruth, Sensors, WrenchWire};
+use mikoshi_ipc_types::{JointCommand, ObjectTruth, PoseWire, RobotTruth, Sensors, WrenchWire};
 use mikoshi_sim_bridge::World as SimulatedWorld;
 use mikoshi_spatial::{Base, Foot, Hand, Object, Pose, World};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -62,12 +62,8 @@ fn about_z(degrees: f64) -> UnitQuaternion<f64> {
 /// Commands that hold the postures of tick 0.
 pub fn constant_commands(run: &RunSpec) -> Vec<JointCommand> {
     let command = |robot: &RobotSpec| {
-        let mut command = JointCommand {
-            joint_position_ref_rad: [0.0; MAX_JOINTS],
-            joint_velocity_ref_rad_s: [0.0; MAX_JOINTS],
-            closed_hands: (1 << robot.grasping_hands.len()) - 1,
-            next_team_command_tick: 0,
-        };
+        let mut command =
+            JointCommand { closed_hands: (1 << robot.grasping_hands.len()) - 1, ..JointCommand::zeroed() };
         command.joint_position_ref_rad[..robot.initial_posture_rad.len()]
             .copy_from_slice(&robot.initial_posture_rad);
         command

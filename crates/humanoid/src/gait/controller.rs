@@ -288,6 +288,15 @@ impl Gait {
         }
     }
 
+    /// Where the centre of mass rests that stays over the feet as they are \[m, world\].
+    pub fn resting_com(&self, state: &GaitState) -> Vector2<f64> {
+        let zmp = match state.phase {
+            GaitPhase::Standing { zmp } => zmp,
+            _ => self.middle(&footholds(state)),
+        };
+        state.load.extended_zmp(&zmp)
+    }
+
     fn seconds(&self, ticks: u64) -> f64 {
         ticks as f64 * self.config.preview.control_period_s
     }

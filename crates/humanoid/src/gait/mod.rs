@@ -11,6 +11,7 @@
 //! - **zero moment point (ZMP)**: where the ground's reaction acts. The **extended** one also holds what
 //!   the hands carry, and is what the centre of mass obeys.
 
+mod coming_to_rest;
 mod controller;
 mod foot_placement;
 mod ground_pose;
@@ -24,6 +25,7 @@ mod swing;
 mod team_clock;
 mod zmp_reference;
 
+pub use coming_to_rest::ComingToRest;
 pub use controller::{FootReference, Gait, GaitConfig, GaitInputs, GaitReference, GaitState};
 pub use foot_placement::{FootError, FootPlacement, HandCentre, MAX_HANDS};
 pub use ground_pose::{GroundPose, heading, wrap};

@@ -26,9 +26,6 @@ use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 use thiserror::Error;
 
-/// What one tick's linearization leaves of an error that it could undo \[m and rad\].
-const LINEARIZATION_ERROR: f64 = 5e-5;
-
 /// Which frames the tasks of eq. 41 move, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IkConfig {
@@ -63,6 +60,8 @@ pub struct IkGains {
     pub step_m: f64,
     /// The same for attitudes \[rad\].
     pub step_rad: f64,
+    /// What one tick's linearization leaves of an error that it could undo \[m and rad\].
+    pub linearization_error: f64,
     /// How far from their position limits joints stop \[rad or m\].
     pub limit_margin: f64,
     /// Share of the way to a position limit that a joint may go in a tick, so that it arrives slowly.
@@ -86,6 +85,7 @@ impl Default for IkGains {
             posture_gain: 0.02,
             step_m: 0.02,
             step_rad: 0.05,
+            linearization_error: 5e-5,
             limit_margin: 0.05,
             limit_approach: 0.2,
             repulsion_zone: 0.15,
@@ -135,6 +135,32 @@ pub struct IkState {
     pub joint_velocity: [f64; MAX_JOINTS],
     active: ActiveSet,
     residual: Residual,
+}
+
+impl IkConfig {
+    /// The same for ticks that are `times` as long: what is done in a tick is what was done in so many, and the null
+    /// space pulls as strongly at what tasks hold.
+    pub fn with_longer_ticks(&self, times: u64) -> Self {
+        let count = times as f64;
+        let compound = |share: f64| 1.0 - (1.0 - share).powf(count);
+        let gains = &self.gains;
+        let ratio = compound(gains.posture_gain) / gains.posture_gain;
+        Self {
+            period_s: self.period_s * count,
+            gains: IkGains {
+                posture_gain: compound(gains.posture_gain),
+                step_m: gains.step_m * count,
+                step_rad: gains.step_rad * count,
+                // As the square of what joints move in a tick.
+                linearization_error: gains.linearization_error * count * count,
+                limit_approach: compound(gains.limit_approach),
+                repulsion_step: gains.repulsion_step * ratio,
+                damping: gains.damping / ratio.sqrt(),
+                ..*gains
+            },
+            ..self.clone()
+        }
+    }
 }
 
 impl IkState {
@@ -510,7 +536,7 @@ impl WholeBodyIk {
     ) {
         let (config, gains) = (&self.config, &self.config.gains);
         let capped = |linear: f64, angular: f64| {
-            let beyond = |error: f64, step: f64| (error.min(step) - LINEARIZATION_ERROR).max(0.0);
+            let beyond = |error: f64, step: f64| (error.min(step) - gains.linearization_error).max(0.0);
             [beyond(linear, gains.step_m), beyond(angular, gains.step_rad)]
         };
         let distances = |error: Twist<World>| (error.linear.norm(), error.angular.norm());
