@@ -66,6 +66,18 @@ fn the_fixture_itself_is_good() {
 }
 
 #[test]
+fn no_object_is_carried_faster_than_anybody_can() {
+    for key in ["travel_m", "travel_rad", "deviation_m_s", "deviation_rad_s"] {
+        let root = fixture();
+        let random = ["motion.random.duration_s=1", "motion.random.change_s=1", "motion.start_s=0.5"];
+        let fast = format!("motion.random.{key}=[0.0, 0.0, 1e308]");
+        let options = [&random[..], &[fast.as_str()]].concat();
+        let told = text_of(root.path(), load(root.path(), &options));
+        assert!(told.contains(&format!("motion.random.{key}")) && told.contains("at most 10"), "{told}");
+    }
+}
+
+#[test]
 fn malformed_toml_names_the_line() {
     file_gives(
         SCENARIO,

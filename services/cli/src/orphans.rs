@@ -66,6 +66,7 @@ impl Orphan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
     use std::process::{Command, Stdio};
 
     #[test]
@@ -73,10 +74,14 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let log = fs::File::create(folder.path().join("log")).expect("a file");
         let mut command = Command::new("sh");
-        let waits = "read line";
+        let waits = "echo ready; read line";
         command.args(["-c", waits, "sh", "--run"]).arg(folder.path());
         command.args(["--standby", "--robot", "B", "--spec", "/a spec"]);
-        let mut child = command.stdin(Stdio::piped()).stderr(log).spawn().expect("it starts");
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(log);
+        let mut child = command.spawn().expect("it starts");
+        // For a moment after it has begun the system does not tell its arguments.
+        let mut word = [0; 5];
+        child.stdout.as_mut().expect("it is a pipe").read_exact(&mut word).expect("it says something");
         let found = orphans_of(folder.path()).expect("/proc is there");
         let [orphan] = &found[..] else { panic!("{found:?}") };
         assert_eq!((orphan.pid, orphan.robot.as_deref(), orphan.is_standby), (child.id(), Some("B"), true));
