@@ -20,6 +20,7 @@ mod comparison;
 mod error;
 mod figures;
 mod html;
+mod latency_page;
 mod page;
 mod render;
 mod run_data;
@@ -33,6 +34,7 @@ mod write;
 
 pub use comparison::{ComparedRuns, EdgeTime, FollowerDelay, LateRobot, LateRun, TimeToEdge};
 pub use error::WriteReportError;
+pub use latency_page::{LatencyReport, LatencyTable, Tail, TickTimeline, write_latency};
 pub use run_data::RunData;
 pub use sweep::{SweepFigure, SweepParameter, SweepQuantity};
 pub use sweep_page::{SweepFailure, SweepReport, write_sweep};

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Where runs go that nobody gave a place.
 const DEFAULT_PARENT: &str = "runs";
 /// Whatever a run leaves, by which a folder with results is recognised and cleared.
-const RESULTS: [&str; 7] = [RUN_LOG, SUMMARY, SCENARIO, ROBOTS, WORLD, SERVICE_LOGS, REPORT];
+const RESULTS: [&str; 8] = [RUN_LOG, SUMMARY, SCENARIO, ROBOTS, WORLD, SERVICE_LOGS, REPORT, LATENCY];
 pub(crate) const RUN_LOG: &str = "run.mcap";
 pub(crate) const SUMMARY: &str = "summary.json";
 const SCENARIO: &str = "scenario.toml";
@@ -17,6 +17,8 @@ const SCENARIO: &str = "scenario.toml";
 const ROBOTS: &str = "scenario.robots";
 const WORLD: &str = "world.xml";
 const SERVICE_LOGS: &str = "logs";
+/// What `mikoshi latency` measured.
+pub(crate) const LATENCY: &str = "latency.json";
 /// What `mikoshi report` draws from the others.
 pub(crate) const REPORT: &str = "report";
 

@@ -5,13 +5,14 @@ mod compare;
 mod costs;
 mod load;
 mod machine;
+mod page;
 mod result;
 
 use crate::arguments::LatencyArguments;
 use crate::failure::{Failure, Status};
 use crate::observer::RunObserver;
 use crate::outcome::Outcome;
-use crate::output_directory::OutputDirectory;
+use crate::output_directory::{LATENCY, OutputDirectory};
 use crate::prepare::prepare_with;
 use crate::print::print_out;
 use crate::supervisor;
@@ -21,6 +22,7 @@ use load::Load;
 use machine::{CoreLateness, MachineWatch, is_the_machines};
 use mikoshi_config::scenario::Clock;
 use mikoshi_observation::LatencyFigures;
+use mikoshi_report::write_latency;
 use result::{LatencyResult, Lateness};
 use std::fs;
 
@@ -97,8 +99,9 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
     };
     let mut text = serde_json::to_string_pretty(&result).map_err(Failure::fault)?;
     text.push('\n');
-    let file = out.path().join("latency.json");
+    let file = out.path().join(LATENCY);
     fs::write(&file, &text).map_err(|error| Failure::fault(error).context(file.display()))?;
+    write_latency(&page::page_of(&result), out.path()).map_err(Failure::fault)?;
     if arguments.json {
         print_out(&text);
     } else if !arguments.results.quiet {

@@ -2,7 +2,6 @@
 
 use super::machine::CoreLateness;
 use crate::table;
-use core::fmt::Write as _;
 use mikoshi_observation::{SpanSummary, WorstTick};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -65,75 +64,94 @@ pub struct ProcessCosts {
     pub involuntary_switches: u64,
 }
 
+pub const TIME_TITLES: [&str; 7] = ["us", "p50", "p90", "p99", "p99.9", "max", "times"];
+pub const MACHINE_TITLES: [&str; 5] = ["waking up, us", "p50", "p99", "p99.9", "max"];
+pub const COST_TITLES: [&str; 5] = ["per tick", "page faults", "allocations", "sleeps", "preempted"];
+
 impl LatencyResult {
-    /// For people.
-    pub fn to_text(&self, out: &Path) -> String {
-        let mut text = String::new();
+    /// Of what.
+    pub fn title(&self) -> String {
         let what = if self.empty { "empty services" } else { "services" };
-        // Writing to a String can't fail.
-        let _ = writeln!(
-            text,
-            "{}: {} robots, {what}, {} clock, {} ticks of {} ms, yielding for {} us{}{}\n",
+        let fifo = self.fifo_priority.map_or_else(String::new, |priority| format!(", FIFO {priority}"));
+        let load = if self.load > 0 { format!(", {} threads of load", self.load) } else { String::new() };
+        format!(
+            "{}: {} robots, {what}, {} clock, {} ticks of {} ms, yielding for {} us{fifo}{load}",
             self.scenario,
             self.robots,
             self.clock,
             self.ticks,
             self.control_period_s * 1e3,
             self.yield_us,
-            self.fifo_priority.map_or_else(String::new, |priority| format!(", FIFO {priority}")),
-            if self.load > 0 { format!(", {} threads of load", self.load) } else { String::new() },
-        );
-        text += &table::of_numbers(
-            &["us", "p50", "p90", "p99", "p99.9", "max", "times"],
-            self.spans.iter().map(|span| {
-                let times = [span.p50_ns, span.p90_ns, span.p99_ns, span.p999_ns, span.max_ns];
-                let cells = times.map(us).into_iter().chain([span.count.to_string()]);
-                core::iter::once(span.span.to_string()).chain(cells).collect()
-            }),
-        );
-        text.push('\n');
-        text += &table::of_numbers(
-            &["waking up, us", "p50", "p99", "p99.9", "max"],
-            [("idle", &self.machine_idle), ("beside the run", &self.machine)].into_iter().flat_map(
-                |(when, cores)| {
-                    cores.iter().map(move |core| {
-                        let times = [core.p50_ns, core.p99_ns, core.p999_ns, core.max_ns].map(us);
-                        core::iter::once(format!("core {}, {when}", core.core)).chain(times).collect()
-                    })
-                },
-            ),
-        );
-        text.push('\n');
-        text += &table::of_numbers(
-            &["per tick", "page faults", "allocations", "sleeps", "preempted"],
-            self.processes.iter().map(|process| {
-                let rate = |count: u64| format!("{:.3}", count as f64 / process.ticks.max(1) as f64);
-                let of_process = [
-                    process.page_faults,
-                    process.allocations,
-                    process.voluntary_switches,
-                    process.involuntary_switches,
-                ];
-                core::iter::once(process.service.clone()).chain(of_process.map(rate)).collect()
-            }),
-        );
+        )
+    }
+
+    /// What it found, in sentences.
+    pub fn findings(&self) -> Vec<String> {
+        let mut findings = vec![];
         if self.clock == "wall" {
             let Lateness { ticks, by_the_machine, by_us, by_nobody_knows } = self.late;
-            let _ = writeln!(
-                text,
-                "\n{ticks} of {} ticks began late: {by_the_machine} by the machine, {by_us} by us, \
+            findings.push(format!(
+                "{ticks} of {} ticks began late: {by_the_machine} by the machine, {by_us} by us, \
                  {by_nobody_knows} nobody can say; {} ticks without a command",
                 self.ticks, self.ticks_held
-            );
+            ));
         }
         if self.frames_lost > 0 {
-            let _ = writeln!(text, "{} frames were not seen", self.frames_lost);
+            findings.push(format!("{} frames were not seen", self.frames_lost));
         }
-        let _ = writeln!(text, "results in {}", out.display());
-        text
+        findings
+    }
+
+    /// Rows below [`TIME_TITLES`].
+    pub fn time_rows(&self) -> Vec<Vec<String>> {
+        let row = |span: &SpanSummary| {
+            let times = [span.p50_ns, span.p90_ns, span.p99_ns, span.p999_ns, span.max_ns];
+            let cells = times.map(us).into_iter().chain([span.count.to_string()]);
+            core::iter::once(span.span.to_string()).chain(cells).collect()
+        };
+        self.spans.iter().map(row).collect()
+    }
+
+    /// Rows below [`MACHINE_TITLES`].
+    pub fn machine_rows(&self) -> Vec<Vec<String>> {
+        let idle = self.machine_idle.iter().map(|core| ("idle", core));
+        let beside = self.machine.iter().map(|core| ("beside the run", core));
+        let row = |(when, core): (&str, &CoreLateness)| {
+            let times = [core.p50_ns, core.p99_ns, core.p999_ns, core.max_ns].map(us);
+            core::iter::once(format!("core {}, {when}", core.core)).chain(times).collect()
+        };
+        idle.chain(beside).map(row).collect()
+    }
+
+    /// Rows below [`COST_TITLES`].
+    pub fn cost_rows(&self) -> Vec<Vec<String>> {
+        let row = |process: &ProcessCosts| {
+            let ProcessCosts { service, ticks, .. } = process;
+            let rate = |count: u64| format!("{:.3}", count as f64 / (*ticks).max(1) as f64);
+            let counts = [
+                process.page_faults,
+                process.allocations,
+                process.voluntary_switches,
+                process.involuntary_switches,
+            ];
+            core::iter::once(service.clone()).chain(counts.map(rate)).collect()
+        };
+        self.processes.iter().map(row).collect()
+    }
+
+    /// For people.
+    pub fn to_text(&self, out: &Path) -> String {
+        let tables = [
+            table::of_numbers(&TIME_TITLES, self.time_rows()),
+            table::of_numbers(&MACHINE_TITLES, self.machine_rows()),
+            table::of_numbers(&COST_TITLES, self.cost_rows()),
+        ];
+        let findings: String = self.findings().iter().map(|finding| format!("{finding}\n")).collect();
+        format!("{}\n\n{}\n{findings}results in {}\n", self.title(), tables.join("\n"), out.display())
     }
 }
 
-fn us(ns: u64) -> String {
+/// Microseconds.
+pub fn us(ns: u64) -> String {
     format!("{:.1}", ns as f64 * 1e-3)
 }
