@@ -99,9 +99,8 @@ pub fn soak(arguments: &SoakArguments, run: &RunSpec, interrupts: &Interrupts) -
         fs::create_dir_all(&folder).map_err(|error| Failure::fault(error).context(folder.display()))?;
         drop(OutputDirectory::open(&folder, true)?);
         let strikes = draw(run, seed, blows);
-        let seed_text = seed.to_string();
-        let options = ["--real-time", "--set", "supervision.standby=true", "--seed", &seed_text];
-        let mut attempt = Attempt::start(arguments, &folder, &options)?;
+        let options = ["--real-time", "--set", "supervision.standby=true"];
+        let mut attempt = Attempt::start(arguments, seed, &folder, &options)?;
         let directory = attempt.directory();
         let struck = strike(&strikes, run.scenario.control_period_s, &mut attempt, interrupts);
         let summary: Summary = serde_json::from_value(attempt.finish(interrupts)?).map_err(Failure::fault)?;

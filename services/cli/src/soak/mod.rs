@@ -90,11 +90,12 @@ pub fn soak(arguments: &SoakArguments) -> Result<Status, Failure> {
         // Nobody else writes there meanwhile.
         drop(OutputDirectory::open(folder, true)?);
     }
-    let undisturbed = Attempt::start(arguments, &calm, &["--in-process"])?.finish(&interrupts)?;
+    let undisturbed =
+        Attempt::start(arguments, run.scenario.seed, &calm, &["--in-process"])?.finish(&interrupts)?;
 
     let kills = arguments.kills.unwrap_or(KILLS);
     let strikes = victims::draw(run.scenario.seed, kills, run.ticks, run.robots.len());
-    let mut attempt = Attempt::start(arguments, &rough, &[])?;
+    let mut attempt = Attempt::start(arguments, run.scenario.seed, &rough, &[])?;
     let mut watch = Watch {
         run: &run,
         directory: attempt.directory(),
@@ -123,18 +124,14 @@ struct Attempt {
 }
 
 impl Attempt {
-    fn start(arguments: &SoakArguments, out: &Path, options: &[&str]) -> Result<Self, Failure> {
+    fn start(arguments: &SoakArguments, seed: u64, out: &Path, options: &[&str]) -> Result<Self, Failure> {
         let program = binaries::find("mikoshi")?;
         let mut command = Command::new(&program);
         command
             .arg("run")
             .arg(&arguments.scenario.scenario)
             .args(["--quiet", "--force", "--no-log", "--out"]);
-        command.arg(out);
-        if let Some(seed) = arguments.scenario.seed {
-            command.args(["--seed", &seed.to_string()]);
-        }
-        command.args(options);
+        command.arg(out).args(["--seed", &seed.to_string()]).args(options);
         for (key, value) in &arguments.scenario.overrides {
             command.arg("--set").arg(format!("{key}={value}"));
         }
