@@ -1,5 +1,6 @@
 //! A servo on a transport.
 
+use crate::coast::Course;
 use crate::robot::BuildRobotError;
 use crate::tick::{STATE_VERSION, Servo, ServoScratch, ServoState};
 use bytemuck::{Pod, Zeroable};
@@ -50,6 +51,8 @@ struct Heard {
     next_usable_tick: u64,
     /// What the robot says of it in its next state: bits of [`flag`].
     flags: u64,
+    /// How hands go on where nothing is heard.
+    course: Course,
 }
 
 impl<T: Transport> ServoParticipant<T> {
@@ -135,6 +138,7 @@ impl<T: Transport> ServoParticipant<T> {
         let last = (self.heard.next_usable_tick > 0).then_some(&self.command);
         let problem = match received {
             Ok(()) if self.servo.accepts(arrived, last, &self.robot_state) => {
+                self.servo.note_course(&mut self.heard.course, last, arrived);
                 self.command = *arrived;
                 self.heard.next_usable_tick = command_tick + 1;
                 return Ok(());
@@ -146,7 +150,7 @@ impl<T: Transport> ServoParticipant<T> {
         };
         self.heard.flags |= problem;
         if last.is_some() {
-            self.servo.lead_on(&mut self.command);
+            self.servo.lead_on(&mut self.heard.course, &mut self.command);
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! One robot's tick, in two halves: `sense` says where it is, `act` says where it goes. No allocation,
 //! no clock, no I/O, no panic path.
 
-use crate::coast;
+use crate::coast::Course;
 use crate::credible;
 use crate::fallback::{Fallback, FallbackState};
 use crate::legs::{Felt, HandReference, Legs, LegsState};
@@ -39,7 +39,7 @@ pub struct Servo {
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 6;
+pub(crate) const STATE_VERSION: u64 = 7;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,8 +154,13 @@ impl Servo {
 
     /// Leads a command on by a tick that nobody has commanded: a step is finished and no other begun, hands
     /// coast to rest.
-    pub(crate) fn lead_on(&self, command: &mut TeamCommand) {
-        coast::lead_on(command, self.legs.timing(), self.period_s);
+    pub(crate) fn lead_on(&self, course: &mut Course, command: &mut TeamCommand) {
+        course.lead_on(command, self.legs.timing(), self.period_s);
+    }
+
+    /// Takes note of a command that follows `last`, as far as one can go on by it.
+    pub(crate) fn note_course(&self, course: &mut Course, last: Option<&TeamCommand>, command: &TeamCommand) {
+        course.note(last, command, self.period_s);
     }
 
     /// Workspaces of its size.
