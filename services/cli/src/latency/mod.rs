@@ -90,7 +90,8 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
         ticks: figures.ticks(),
         spans: figures.spans(),
         late: lateness(&figures, &machine),
-        ticks_held: summary.timing.ticks_held,
+        // Services that compute nothing don't say what they heard.
+        ticks_held: if arguments.empty { 0 } else { summary.timing.ticks_held },
         frames_lost: summary.timing.frames_lost,
         processes: costs.of(run),
         machine_idle,

@@ -92,9 +92,12 @@ impl LatencyResult {
             let Lateness { ticks, by_the_machine, by_us, by_nobody_knows } = self.late;
             findings.push(format!(
                 "{ticks} of {} ticks began late: {by_the_machine} by the machine, {by_us} by us, \
-                 {by_nobody_knows} nobody can say; {} ticks without a command",
-                self.ticks, self.ticks_held
+                 {by_nobody_knows} nobody can say",
+                self.ticks
             ));
+        }
+        if self.ticks_held > 0 {
+            findings.push(format!("{} ticks without some robot's command", self.ticks_held));
         }
         if self.frames_lost > 0 {
             findings.push(format!("{} frames were not seen", self.frames_lost));
