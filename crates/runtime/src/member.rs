@@ -187,8 +187,8 @@ impl Member {
         };
         loop {
             let look_ns = now_ns().saturating_add((period_ns / 2).max(LEAST_LOOK_NS));
-            // Whoever is in charge may make room, or be given up.
-            let gone = || (slot.state() == State::Retired || self.has_exited(self.slot)).then_some(());
+            // Whoever makes room does so for another, who is ready; unless that is lost, too.
+            let gone = || self.has_exited(self.slot).then_some(());
             let is_gone = self.wait_beside(Some(look_ns), || Ok(gone()))?.is_some();
             if slot.state() == State::Done || self.board.stop_is_requested() {
                 return Err(TickError::Stopped);
@@ -196,7 +196,8 @@ impl Member {
             if is_gone {
                 return Ok(None);
             }
-            if pace.is_some() && slot.state() == State::Running && is_behind() {
+            let is_to_work = matches!(slot.state(), State::Running | State::Retired);
+            if pace.is_some() && is_to_work && is_behind() {
                 return Ok(slot.process());
             }
         }

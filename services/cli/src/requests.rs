@@ -76,8 +76,17 @@ impl Requests {
             let (service, epoch) = (*service, *epoch);
             let charge = board.charge_of(service).filter(|(current, _)| *current > epoch);
             let has_ended = children.candidate(service).is_none_or(|process| process.ended.is_some());
+            let in_charge = board.process_of(service).map(|process| process.pid);
+            let is_candidate = in_charge == children.candidate(service).map(|process| process.id());
             match charge {
-                Some((_, since)) => {
+                // Its predecessor was lost meanwhile, and a standby was first.
+                Some(_) if !is_candidate && !has_ended => {
+                    let label = label_of(run, service);
+                    let client = self.pending.swap_remove(index).client;
+                    client.refuse(format!("{label} was just replaced by its standby: ask again"));
+                    children.dismiss(service);
+                }
+                Some((_, since)) if is_candidate => {
                     let Pending { client, revised, .. } = self.pending.swap_remove(index);
                     children.promote(service);
                     let swap = swap_of(run, service, since.tick + 1, "swap".to_owned());
@@ -87,7 +96,7 @@ impl Requests {
                     }
                     observer.note_swap(service, swap);
                 }
-                None if has_ended => {
+                _ if has_ended => {
                     let words = children.candidate(service).map(|process| process.last_words());
                     let label = label_of(run, service);
                     let words = words.unwrap_or_default();
@@ -95,7 +104,7 @@ impl Requests {
                     client.refuse(format!("{label} stays: its successor has ended{words}"));
                     children.dismiss(service);
                 }
-                None => index += 1,
+                _ => index += 1,
             }
         }
     }

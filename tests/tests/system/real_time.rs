@@ -84,3 +84,25 @@ fn without_a_standby_and_a_successor_the_team_stops_and_holds() {
     assert_eq!(last["mode"], "safe stop");
     assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
 }
+
+#[test]
+fn a_swap_puts_the_new_process_in_charge_and_not_the_standby() {
+    let results = Results::new();
+    let of_run = ["--set", "duration_s=8", "--set", "hybrid.start_s=1", "--set", "supervision.standby=true"];
+    let running = start(&[&PATIENT[..], &of_run].concat(), &results);
+    running.wait_for_standbys(3);
+    let directory = running.directory();
+    let name = directory.file_name().expect("a name").to_string_lossy().into_owned();
+    let swap = || say_mikoshi(["swap", "A", "--run", &name, "--set", "balance.stabiliser=false"]);
+    // On a busy machine the standby may just have been needed.
+    while swap().status != Some(0) {}
+    let board = mikoshi_runtime::Board::open(&directory).expect("it is running");
+    let process = board.process_of(ServiceId::Servo(0)).expect("it has one");
+    let told = std::fs::read_to_string(format!("/proc/{}/cmdline", process.pid)).expect("it lives");
+    assert!(told.contains("--spec") && told.contains("--replace"), "{told:?}");
+    let said = running.wait();
+    assert!(matches!(said.status, Some(0 | 1)), "{said:#?}");
+    let swaps = &results.summary()["swaps"];
+    assert!(swaps.as_array().expect("a list").iter().any(|swap| swap["cause"] == "swap"), "{swaps:#}");
+    assert_eq!(left_behind(&directory), Vec::<PathBuf>::new());
+}
