@@ -392,14 +392,10 @@ impl Default for Placement {
             coordinator_core: None,
             servo_cores: vec![],
             fifo_priority: None,
-            yield_us: default_yield_us(),
+            yield_us: 20,
             rt: MissingRights::default(),
         }
     }
-}
-
-fn default_yield_us() -> u32 {
-    20
 }
 
 /// What to do about a core, a priority or locked memory that is not granted.

@@ -51,6 +51,8 @@ pub struct JointLayout {
     pub kp: f64,
     pub kv: f64,
     pub effort: f64,
+    /// Lower and upper \[rad\].
+    pub limits: [f64; 2],
 }
 
 /// A force/torque sensor, in the sensor data.
@@ -159,6 +161,7 @@ impl Finder<'_> {
                 kp: drive.kp_nm_rad,
                 kv: drive.kv_nms_rad,
                 effort: joint.effort,
+                limits: [joint.lower, joint.upper],
             })
         });
         let hands = robot.hands.iter().zip(grasps).zip(&robot.spec.hand_in_object);

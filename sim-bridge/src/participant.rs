@@ -2,7 +2,6 @@
 
 use crate::coast::{Coast, Rates};
 use crate::fallback::{Fallback, FallbackState};
-use crate::robot::Robot;
 use crate::{BuildWorldError, World};
 use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
@@ -11,7 +10,7 @@ use mikoshi_ipc_types::{
 };
 use mikoshi_runtime::{
     Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, Transport,
-    read_parts, state_schema, write_parts,
+    has_arrived, read_parts, state_schema, write_parts,
 };
 use thiserror::Error;
 
@@ -70,17 +69,12 @@ impl<T: Transport> BridgeParticipant<T> {
                 command: transport.subscriber(robot)?,
             })
         };
-        let period_s = run.scenario.control_period_s;
-        let fallback = |spec| {
-            let joints = Robot::resolve(spec)?.model;
-            let limits = joints.joints().iter().map(|joint| [joint.lower, joint.upper]);
-            Ok(Fallback::new(period_s, limits.collect()))
-        };
-        let fallbacks = run.robots.iter().map(fallback).collect::<Result<Vec<_>, BuildWorldError>>()?;
         let robots = (0..run.robots.len()).map(ports).collect::<Result<Vec<_>, ConnectError>>()?;
         let frame = Frame::zeroed();
+        let (world, period_s) = (World::new(run)?, run.scenario.control_period_s);
+        let fallbacks = world.joint_limits().map(|limits| Fallback::new(period_s, limits)).collect();
         Ok(Self {
-            world: World::new(run)?,
+            world,
             commands: vec![frame.payload; robots.len()],
             next_command_tick: [0; MAX_ROBOTS],
             rates_before: [[0.0; MAX_JOINTS]; MAX_ROBOTS],
@@ -124,7 +118,7 @@ impl<T: Transport> BridgeParticipant<T> {
         for (robot, (((ports, heard), (fallback, state)), last)) in robots.enumerate() {
             let ((command, next_tick), rates_before) = heard;
             let received = ports.command.receive(tick, &mut self.frame);
-            if matches!(received, Ok(()) | Err(TickError::NotFinite { .. })) {
+            if has_arrived(&received) {
                 *next_tick = tick + 1;
             }
             *command = match received {

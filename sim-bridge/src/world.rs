@@ -177,6 +177,12 @@ impl World {
         self.fingerprint
     }
 
+    /// Lower and upper limit of every joint, by robot.
+    pub(crate) fn joint_limits(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
+        let robots = self.layout.robots.iter();
+        robots.map(|robot| robot.joints.iter().map(|joint| joint.limits).collect())
+    }
+
     /// The commands of the last tick.
     pub fn commands(&self) -> &[JointCommand] {
         &self.state.commands

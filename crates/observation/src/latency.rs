@@ -14,7 +14,12 @@ const WORST_TICKS: usize = 10;
 /// Late ticks that are remembered; more than that is no measurement any more.
 const MAX_LATE_TICKS: usize = 100_000;
 /// A tick that begins so much of a period after it was due is late.
-pub const LATE: f64 = 0.1;
+const LATE: f64 = 0.1;
+
+/// A histogram of times, empty. What it occupies does not grow with what it holds.
+pub fn times_ns() -> Histogram<u64> {
+    Histogram::new_with_max(LONGEST_NS, SIGNIFICANT_DIGITS).expect("bounds that a histogram can have")
+}
 
 /// A part of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -148,8 +153,7 @@ pub struct LateTick {
 impl LatencyFigures {
     /// Of a run with this control period, in which commands are so many ticks old; its first ticks don't count.
     pub fn new(control_period_s: f64, coordination_delay_ticks: u64, warm_up_ticks: u64) -> Self {
-        let histogram = || Histogram::new_with_max(LONGEST_NS, SIGNIFICANT_DIGITS);
-        let histograms = Span::ALL.iter().map(|_| histogram().expect("bounds that it can have")).collect();
+        let histograms = Span::ALL.iter().map(|_| times_ns()).collect();
         Self {
             period_ns: control_period_s * 1e9,
             waits_for_command: coordination_delay_ticks == 0,

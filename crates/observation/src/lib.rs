@@ -20,7 +20,7 @@ mod truth;
 pub use canonical::{LogHash, Observation, Observed, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use freshness::Freshness;
-pub use latency::{LATE, LateTick, LatencyFigures, PhaseTimes, Span, SpanSummary, WorstTick};
+pub use latency::{LateTick, LatencyFigures, PhaseTimes, Span, SpanSummary, WorstTick, times_ns};
 pub use log::{LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{

@@ -35,6 +35,7 @@ pub use domain::{Domain, DomainError};
 pub use double::Double;
 pub use error::{FaultCode, TickError};
 pub use member::{Entry, JoinError, Member, TAP_LEAD_TICKS};
+pub use pace::{now_ns, sleep_until};
 pub use process::{ProcessIdentity, ProcessWatch};
 pub use real_time::{MissingRight, OnMissingRight, RealTime};
 pub use run_directory::{FoundRun, RunDirectory, RunDirectoryError};
@@ -46,6 +47,6 @@ pub use transport::iceoryx::{IceoryxTap, IceoryxTransport, OpenError, required_b
 pub use transport::memory::{InMemoryHub, InMemoryTap, InMemoryTransport};
 pub use transport::{
     ConnectError, InOrder, Loan, OBSERVER_DEPTH, Observer, OperatorPort, Publisher, Subscriber, Tap,
-    Transport,
+    Transport, has_arrived,
 };
 pub use wait::WaitPolicy;

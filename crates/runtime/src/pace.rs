@@ -10,13 +10,13 @@ const NS_PER_S: u64 = 1_000_000_000;
 const START_PATIENCE_NS: u64 = NS_PER_S;
 
 /// Nanoseconds on the machine's monotonic clock.
-pub(crate) fn now_ns() -> u64 {
+pub fn now_ns() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
 }
 
 /// Sleeps until this time, and not at all if it has passed.
-pub(crate) fn sleep_until(due_ns: u64) {
+pub fn sleep_until(due_ns: u64) {
     let due = Timespec { tv_sec: (due_ns / NS_PER_S) as i64, tv_nsec: (due_ns % NS_PER_S) as i64 };
     while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &due) == Err(rustix::io::Errno::INTR) {
     }

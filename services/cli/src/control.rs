@@ -2,6 +2,7 @@
 //! directory, and one line back.
 
 use crate::failure::{Failure, Status};
+use crate::socket::listen;
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_runtime::{Board, RunDirectory};
@@ -73,12 +74,7 @@ impl Control {
     /// # Errors
     /// There can be no socket.
     pub fn listen(run: &Path) -> io::Result<Self> {
-        let socket = run.join(SOCKET);
-        // That of a supervisor that was killed; nobody else has the run.
-        let _ = std::fs::remove_file(&socket);
-        let listener = UnixListener::bind(socket)?;
-        listener.set_nonblocking(true)?;
-        Ok(Self { listener, clients: Vec::new() })
+        Ok(Self { listener: listen(&run.join(SOCKET))?, clients: Vec::new() })
     }
 
     /// The next request, if there is a whole one. It never waits.

@@ -1,5 +1,6 @@
 //! The folder in which a run leaves its results.
 
+use crate::arguments::ResultsArguments;
 use crate::failure::Failure;
 use rustix::fs::{FlockOperation, flock};
 use std::fs::{self, File};
@@ -49,6 +50,17 @@ impl From<OpenOutputError> for Failure {
 }
 
 impl OutputDirectory {
+    /// The folder that was asked for or, if none was, a new one with this name and seed.
+    ///
+    /// # Errors
+    /// As [`OutputDirectory::open`].
+    pub fn of(arguments: &ResultsArguments, name: &str, seed: u64) -> Result<Self, OpenOutputError> {
+        match &arguments.out {
+            Some(path) => Self::open(path, arguments.force),
+            None => Self::fresh(name, seed),
+        }
+    }
+
     /// The folder `path`, made if it is not there. One that holds results is refused, unless `force`:
     /// then they are removed, and nothing else.
     ///
@@ -75,7 +87,7 @@ impl OutputDirectory {
     ///
     /// # Errors
     /// It can't be made.
-    pub fn fresh(scenario: &str, seed: u64) -> Result<Self, OpenOutputError> {
+    fn fresh(scenario: &str, seed: u64) -> Result<Self, OpenOutputError> {
         Self::fresh_in(Path::new(DEFAULT_PARENT), scenario, seed)
     }
 

@@ -27,24 +27,19 @@ pub struct Prepared {
 /// # Errors
 /// Whatever is wrong with it: [`Status::Usage`](crate::failure::Status::Usage).
 pub fn prepare(arguments: &ScenarioArguments) -> Result<Prepared, Failure> {
-    prepare_with(arguments, &[])
+    prepare_paced(arguments, false)
 }
 
-/// The same, with these values put in place of the scenario's after all others.
+/// The same, paced by the clock if so wished, whatever the scenario says.
 ///
 /// # Errors
 /// As [`prepare`].
-pub fn prepare_with(
-    arguments: &ScenarioArguments,
-    overrides: &[(String, String)],
-) -> Result<Prepared, Failure> {
-    let overrides = [&arguments.overrides, overrides].concat();
+pub fn prepare_paced(arguments: &ScenarioArguments, by_the_clock: bool) -> Result<Prepared, Failure> {
+    let mut overrides = arguments.overrides.clone();
+    overrides.extend(by_the_clock.then(|| ("clock".to_owned(), "wall".to_owned())));
     let loaded = load_scenario(&arguments.scenario, &overrides, arguments.seed).map_err(Failure::usage)?;
     let run = resolve(&loaded).map_err(Failure::usage)?;
-    let arms = team_arms(&run).map_err(Failure::usage)?;
-    let law = build_hybrid_law(&run).map_err(|error| place(&loaded, error))?;
-    let schedule = tick_schedule(&run).map_err(Failure::usage)?;
-    Ok(Prepared { run, arms, law, schedule, is_empty: false })
+    assemble(run, |error| place(&loaded, error))
 }
 
 /// The same of a run that is known already.
@@ -52,8 +47,13 @@ pub fn prepare_with(
 /// # Errors
 /// It is of another build: [`Status::Usage`](crate::failure::Status::Usage).
 pub fn prepare_resolved(run: RunSpec) -> Result<Prepared, Failure> {
+    assemble(run, Failure::usage)
+}
+
+/// `tell` says what is wrong with the law.
+fn assemble(run: RunSpec, tell: impl FnOnce(BuildCoordinatorError) -> Failure) -> Result<Prepared, Failure> {
     let arms = team_arms(&run).map_err(Failure::usage)?;
-    let law = build_hybrid_law(&run).map_err(Failure::usage)?;
+    let law = build_hybrid_law(&run).map_err(tell)?;
     let schedule = tick_schedule(&run).map_err(Failure::usage)?;
     Ok(Prepared { run, arms, law, schedule, is_empty: false })
 }

@@ -3,13 +3,10 @@
 use core::time::Duration;
 use hdrhistogram::Histogram;
 use mikoshi_config::scenario::Clock;
-use mikoshi_observation::Timing;
+use mikoshi_observation::{Timing, times_ns};
 
 /// A tick is late if it took more than so many periods.
 const LATE: f64 = 1.1;
-/// To a thousandth of themselves times are told apart, up to a minute.
-const SIGNIFICANT_DIGITS: u8 = 3;
-const LONGEST_NS: u64 = 60_000_000_000;
 
 /// When ticks began, by the bridge's clock. What it occupies does not grow with the run.
 pub struct Stamps {
@@ -26,9 +23,7 @@ impl Stamps {
             Clock::Lockstep => f64::INFINITY,
             Clock::Wall => LATE * period_s * 1e9,
         };
-        let periods_ns = Histogram::new_with_max(LONGEST_NS, SIGNIFICANT_DIGITS);
-        let periods_ns = periods_ns.expect("bounds that a histogram can have");
-        Self { late_ns, ticks_late: 0, last_ns: None, periods_ns }
+        Self { late_ns, ticks_late: 0, last_ns: None, periods_ns: times_ns() }
     }
 
     /// Takes in when a tick began.

@@ -7,8 +7,8 @@ use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, MAX_ROBOTS, Payload, RobotState, ServiceId, TeamCommand, TeamState, flag};
 use mikoshi_runtime::{
-    Call, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_parts,
-    state_schema, write_parts,
+    Call, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, has_arrived,
+    read_parts, state_schema, write_parts,
 };
 
 /// The coordinator with its ports.
@@ -61,7 +61,7 @@ impl<T: Transport> CoordinatorParticipant<T> {
         for ((port, (believed, next_tick)), &hands) in ports {
             let last = (*next_tick > 0).then_some(&*believed);
             let received = port.receive(tick, &mut self.arrived);
-            if matches!(received, Ok(()) | Err(TickError::NotFinite { .. })) {
+            if has_arrived(&received) {
                 *next_tick = tick + 1;
             }
             match received {

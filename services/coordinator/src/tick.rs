@@ -426,7 +426,10 @@ impl Coordinator {
         Ok(true)
     }
 
-    /// The law starts at `tick`, as [`start_law`] says, with all who take part in their grips.
+    /// A law starts at `tick`, with the object's frame at `X_WA`: references of forces begin with what is there,
+    /// and the virtual sticks are created anew from the hands as they are now (section 4.3, step 2). Whatever the
+    /// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the object, and all
+    /// who take part are in their grips.
     fn start_law(
         &self,
         state: &mut CoordinatorState,
@@ -436,7 +439,13 @@ impl Coordinator {
         X_WA: &Pose<World, Object>,
         law: &HybridOutput,
     ) {
-        start_law(state, tick, hands, grasp_yield, X_WA, law);
+        // Where they coincide if nothing yields: what yields is added to their mean in every tick.
+        let X_WB = X_WA.displaced(&-*grasp_yield);
+        for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
+            *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
+        }
+        (state.hybrid_since, state.formed_since, state.off_at_start) = (tick, tick, [0.0; 6]);
+        write_force(&law.force, &mut state.force_at_start);
         let seen = grips::Seen { X_WA, hands, hand_wrench: &state.hand_wrench };
         self.grips.begin(&mut state.grips, &state.hybrid, &seen);
     }
@@ -580,26 +589,6 @@ fn read_hands<'a>(
         }
     }
     Ok(())
-}
-
-/// A law starts at `tick`, with the object's frame at `X_WA`: references of forces begin with what is there,
-/// and the virtual sticks are created anew from the hands as they are now (section 4.3, step 2). Whatever the
-/// grasps have done since the hands closed, all tips now coincide with Σa, which stays fixed to the object.
-fn start_law(
-    state: &mut CoordinatorState,
-    tick: u64,
-    hands: &[HandInput],
-    grasp_yield: &Twist<World>,
-    X_WA: &Pose<World, Object>,
-    law: &HybridOutput,
-) {
-    // Where they coincide if nothing yields: what yields is added to their mean in every tick.
-    let X_WB = X_WA.displaced(&-*grasp_yield);
-    for (slot, hand) in state.hybrid.sticks.iter_mut().zip(hands) {
-        *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
-    }
-    (state.hybrid_since, state.formed_since, state.off_at_start) = (tick, tick, [0.0; 6]);
-    write_force(&law.force, &mut state.force_at_start);
 }
 
 /// Moves every hand's reference along its palm; it stays there.

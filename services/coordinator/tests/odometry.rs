@@ -3,14 +3,16 @@
 
 #![allow(non_snake_case)]
 
+mod common;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bytemuck::Zeroable;
-use mikoshi_config::{RunSpec, load_scenario};
+use common::resolved;
+use mikoshi_config::RunSpec;
 use mikoshi_coordinator::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState};
 use mikoshi_ipc_types::{PoseWire, RobotState, all_hands, flag, mode};
 use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench, log};
 use nalgebra::{UnitQuaternion, Vector3};
-use std::path::Path;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -38,11 +40,7 @@ struct Team {
 
 impl Team {
     fn holding(overrides: &[(&str, &str)]) -> Self {
-        let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/hold.toml");
-        let overrides = overrides.iter().chain(&[("hybrid.start_s", "0.1")]);
-        let overrides: Vec<_> = overrides.map(|(key, value)| (key.to_string(), value.to_string())).collect();
-        let scenario = load_scenario(&scenario, &overrides, None).expect("it loads");
-        let run = mikoshi_resolution::resolve(&scenario).expect("it resolves");
+        let run = resolved("hold", &[overrides, &[("hybrid.start_s", "0.1")]].concat());
         let coordinator = Coordinator::new(&run).expect("a coordinator");
         let hands = run.robots.iter().map(|robot| robot.grasping_hands.len()).sum();
         Self {

@@ -2,31 +2,22 @@
 
 #![allow(non_snake_case)]
 
+mod common;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bytemuck::Zeroable;
-use mikoshi_config::{RunSpec, load_scenario};
+use common::resolved;
+use mikoshi_config::RunSpec;
 use mikoshi_coordinator::{Coordinator, CoordinatorOutputs};
 use mikoshi_ipc_types::{RobotState, TeamCommand, all_hands, flag, mode};
 use mikoshi_spatial::{Hand, Object, Pose, World};
 use nalgebra::{UnitQuaternion, Vector3};
-use std::path::Path;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 fn hold(overrides: &[(&str, &str)]) -> RunSpec {
     resolved("hold", overrides)
-}
-
-fn resolved(scenario: &str, overrides: &[(&str, &str)]) -> RunSpec {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../config/scenarios")
-        .join(scenario)
-        .with_extension("toml");
-    let overrides: Vec<_> =
-        overrides.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
-    mikoshi_resolution::resolve(&load_scenario(&path, &overrides, None).expect("it loads"))
-        .expect("it resolves")
 }
 
 /// Robots whose hands are where the run begins, a little off, and pull at the object.

@@ -7,8 +7,8 @@ use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, TeamCommand, flag};
 use mikoshi_runtime::{
-    Call, ConnectError, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, read_parts,
-    read_state, state_schema, write_parts, write_state,
+    Call, ConnectError, Participant, Publisher, Replaceable, Subscriber, TickError, Transport, has_arrived,
+    read_parts, read_state, state_schema, write_parts, write_state,
 };
 
 /// Why a servo could not be made.
@@ -88,7 +88,7 @@ impl<T: Transport> ServoParticipant<T> {
         let mut flags = core::mem::take(&mut self.heard.flags);
         let received = self.sensor_port.receive(tick, &mut self.sensors);
         let sensors = &self.sensors.payload;
-        let has_arrived = matches!(received, Ok(()) | Err(TickError::NotFinite { .. }));
+        let has_arrived = has_arrived(&received);
         let next_sensors_tick = if has_arrived { tick + 1 } else { self.robot_state.next_sensors_tick };
         match received {
             Ok(()) if self.servo.believes(sensors) => {
@@ -130,7 +130,7 @@ impl<T: Transport> ServoParticipant<T> {
     /// robot says so in its next state.
     fn hear(&mut self, command_tick: u64) -> Result<(), TickError> {
         let received = self.command_port.receive(command_tick, &mut self.arrived);
-        let has_arrived = matches!(received, Ok(()) | Err(TickError::NotFinite { .. }));
+        let has_arrived = has_arrived(&received);
         if has_arrived {
             self.heard.next_tick = command_tick + 1;
         }

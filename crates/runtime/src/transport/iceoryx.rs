@@ -97,13 +97,11 @@ pub(super) struct Process {
     schedule: TickSchedule,
     /// Where ticks are paced by the clock.
     pace: Option<Pace>,
-    /// When the inputs of the current phase are due.
+    /// When the current phase is due: it begins then, or has heard its inputs.
     due_ns: Cell<Option<u64>>,
     /// When the last input came, or was given up, and when what came of it was kept.
     heard_ns: Cell<u64>,
     kept_ns: Cell<u64>,
-    /// When the current phase was due.
-    phase_due_ns: Cell<u64>,
     run: PathBuf,
     domain: Domain,
     ports: Ports,
@@ -155,7 +153,6 @@ impl Process {
             due_ns: Cell::new(None),
             heard_ns: Cell::default(),
             kept_ns: Cell::default(),
-            phase_due_ns: Cell::default(),
             run,
             domain,
             ports,
@@ -314,14 +311,13 @@ impl Session for IceoryxTransport {
     }
 
     fn begin_phase(&self, at: Position) -> Result<(), TickError> {
-        let Process { member, pace, due_ns, phase_due_ns, .. } = &*self.process;
+        let Process { member, pace, due_ns, .. } = &*self.process;
         member.begin_phase(at)?;
         let opens_tick = self.opens_tick && at.phase == 0;
         match pace {
-            Some(pace) if opens_tick => phase_due_ns.set(member.begin_tick(pace, at.tick)),
+            Some(pace) if opens_tick => due_ns.set(Some(member.begin_tick(pace, at.tick))),
             Some(pace) => {
                 due_ns.set(member.board().origin_ns().and_then(|origin_ns| pace.due_ns(origin_ns, at)));
-                phase_due_ns.set(due_ns.get().unwrap_or_default());
             }
             None if opens_tick => member.wait_for_tap((at.tick + 1).saturating_sub(TAP_LEAD_TICKS))?,
             None => {}
@@ -444,7 +440,7 @@ impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
             stamp_ns: 0,
             heard_ns: self.process.heard_ns.get(),
             kept_ns: self.process.kept_ns.get(),
-            due_ns: self.process.phase_due_ns.get(),
+            due_ns: self.process.due_ns.get().unwrap_or_default(),
         };
         Ok(IceoryxLoan { sample, publisher: self })
     }

@@ -146,6 +146,11 @@ pub trait Subscriber<P: Payload> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError>;
 }
 
+/// Whether a frame of the tick has come, though it may hold what can't be used.
+pub fn has_arrived(received: &Result<(), TickError>) -> bool {
+    matches!(received, Ok(()) | Err(TickError::NotFinite { .. }))
+}
+
 /// Sees every frame of one topic, as it is: nothing is checked but that it can be read.
 pub trait Observer<P: Payload> {
     /// The next frame in order, if there is one.

@@ -6,7 +6,7 @@ use crate::gain::GainReport;
 use crate::observer::RunObserver;
 use crate::outcome::Outcome;
 use crate::output_directory::OutputDirectory;
-use crate::prepare::{Prepared, prepare_with};
+use crate::prepare::{Prepared, prepare_paced};
 use crate::print::{print_error, print_out};
 use crate::report::report;
 use mikoshi_config::save_scenario;
@@ -22,8 +22,7 @@ pub fn run(
     arguments: &RunArguments,
     execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
 ) -> Result<Status, Failure> {
-    let by_the_clock = [("clock".to_owned(), "wall".to_owned())];
-    let prepared = prepare_with(&arguments.scenario, if arguments.real_time { &by_the_clock } else { &[] })?;
+    let prepared = prepare_paced(&arguments.scenario, arguments.real_time)?;
     let scenario = &prepared.run.scenario;
     if let Some(warning) = scenario.is_controlled().then(|| GainReport::of(&prepared).warning()).flatten() {
         print_error(&as_lines("warning", &warning));
@@ -38,10 +37,7 @@ pub(super) fn carry_out(
     execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
 ) -> Result<Status, Failure> {
     let scenario = &prepared.run.scenario;
-    let out = match &arguments.out {
-        Some(path) => OutputDirectory::open(path, arguments.force)?,
-        None => OutputDirectory::fresh(&scenario.name, scenario.seed)?,
-    };
+    let out = OutputDirectory::of(arguments, &scenario.name, scenario.seed)?;
     save_scenario(&prepared.run, &out.scenario()).map_err(Failure::fault)?;
 
     let mut observer = RunObserver::new(prepared, arguments, &out)?;

@@ -82,14 +82,14 @@ mod tests {
     }
 
     /// What a listener hears of a feed that says this once both are connected.
-    fn heard(wish: Wish, says: impl FnOnce(&mut Feed)) -> Vec<String> {
+    fn heard(wish: Wish, says: impl FnOnce(&mut Feed, &Path)) -> Vec<String> {
         let folder = tempfile::tempdir().expect("a folder");
         let mut feed = Feed::open(folder.path(), ROBOTS).expect("a socket");
         let mut listener = Listener::connect(folder.path(), ROBOTS, wish).expect("it listens");
         while !feed.has_listeners() {
             feed.look();
         }
-        says(&mut feed);
+        says(&mut feed, folder.path());
         std::thread::scope(|scope| {
             scope.spawn(move || feed.end());
             let mut all = vec![];
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn what_is_said_is_heard_in_its_order() {
         let run = run();
-        let all = heard(Wish::All, |feed| {
+        let all = heard(Wish::All, |feed, _| {
             feed.tick(&tick(5));
             feed.revision(6, ServiceId::Servo(1), &run);
             feed.tick(&tick(6));
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn who_does_not_listen_in_time_loses_ticks_and_is_told_how_many() {
-        let all = heard(Wish::Some, |feed| {
+        let all = heard(Wish::Some, |feed, _| {
             for number in 0..20_000 {
                 feed.tick(&tick(number));
             }
@@ -158,8 +158,7 @@ mod tests {
 
     #[test]
     fn whoever_says_nonsense_or_nothing_or_leaves_disturbs_nobody() {
-        let all = heard(Wish::All, |feed| {
-            let folder = feed.folder().to_owned();
+        let all = heard(Wish::All, |feed, folder| {
             let connect = || UnixStream::connect(folder.join(SOCKET)).expect("it listens");
             let _silent = connect();
             let mut nonsense = connect();

@@ -1,13 +1,13 @@
 //! The supervisor's end.
 
 use super::{HEAD_BYTES, Kind, SOCKET, Wish};
+use crate::socket::listen;
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::Observation;
 use std::collections::VecDeque;
-use std::fs;
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
@@ -25,8 +25,6 @@ const LOOK: Duration = Duration::from_millis(1);
 /// Tells listeners what is seen of a run.
 pub struct Feed {
     socket: UnixListener,
-    #[cfg(test)]
-    folder: std::path::PathBuf,
     robots: usize,
     listeners: Vec<Listening>,
     /// The message that is being made.
@@ -49,25 +47,7 @@ impl Feed {
     /// # Errors
     /// There can be no socket.
     pub fn open(run: &Path, robots: usize) -> io::Result<Self> {
-        let path = run.join(SOCKET);
-        // That of a supervisor that was killed; nobody else has the run.
-        let _ = fs::remove_file(&path);
-        let socket = UnixListener::bind(path)?;
-        socket.set_nonblocking(true)?;
-        Ok(Self {
-            socket,
-            #[cfg(test)]
-            folder: run.to_owned(),
-            robots,
-            listeners: vec![],
-            message: vec![],
-        })
-    }
-
-    /// Where its socket is.
-    #[cfg(test)]
-    pub fn folder(&self) -> &Path {
-        &self.folder
+        Ok(Self { socket: listen(&run.join(SOCKET))?, robots, listeners: vec![], message: vec![] })
     }
 
     /// Whether anybody listens.

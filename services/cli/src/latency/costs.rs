@@ -2,6 +2,7 @@
 
 use super::result::ProcessCosts;
 use crate::outcome::label_of;
+use crate::process_status::ProcessStatus;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_runtime::Board;
@@ -77,16 +78,12 @@ impl Counters {
         let fields: Vec<&str> = after_name.split_ascii_whitespace().collect();
         // Fields 10 and 12 of the line: minor and major faults.
         let field = |number: usize| fields.get(number - 3)?.parse::<u64>().ok();
-        let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-        let switches = |name: &str| {
-            let line = status.lines().find_map(|line| line.strip_prefix(name))?;
-            line.trim().parse::<u64>().ok()
-        };
+        let status = ProcessStatus::of(pid)?;
         Some(Self {
             pid,
             page_faults: field(10)? + field(12)?,
-            voluntary_switches: switches("voluntary_ctxt_switches:")?,
-            involuntary_switches: switches("nonvoluntary_ctxt_switches:")?,
+            voluntary_switches: status.number("voluntary_ctxt_switches")?,
+            involuntary_switches: status.number("nonvoluntary_ctxt_switches")?,
             ..Self::default()
         })
     }

@@ -3,11 +3,8 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use hdrhistogram::Histogram;
-use mikoshi_observation::LateTick;
-use mikoshi_runtime::{OnMissingRight, RealTime};
-use rustix::thread::{ClockId, Timespec, clock_nanosleep_absolute};
-use rustix::time::clock_gettime;
+use mikoshi_observation::{LateTick, times_ns};
+use mikoshi_runtime::{OnMissingRight, RealTime, now_ns, sleep_until};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -17,7 +14,6 @@ const PERIOD_NS: u64 = 1_000_000;
 /// What is told as a stall.
 const STALL_NS: u64 = 100_000;
 const MAX_STALLS: usize = 100_000;
-const NS_PER_S: u64 = 1_000_000_000;
 /// Of the time by which a tick was late, as much must lie within stalls for it to be the machine's fault.
 const MACHINES_SHARE: f64 = 0.5;
 
@@ -73,8 +69,7 @@ fn watch_core(core: usize, fifo_priority: Option<u8>, is_over: &AtomicBool) -> C
     };
     let missing = ask(fifo_priority.map(|priority| priority.saturating_add(1).min(99))).apply();
     let is_above_services = fifo_priority.is_some() && missing.is_ok_and(|missing| missing.is_empty());
-    let mut histogram =
-        Histogram::<u64>::new_with_max(60 * NS_PER_S, 3).expect("bounds that a histogram can have");
+    let mut histogram = times_ns();
     let mut stalls = vec![];
     let mut due_ns = now_ns();
     while !is_over.load(Ordering::Relaxed) {
@@ -113,16 +108,6 @@ pub fn is_the_machines(late: &LateTick, cores: &[CoreLateness]) -> Option<bool> 
     let longest_ns = cores.iter().map(|core| core.stalls.iter().map(overlap_ns).sum::<u64>()).max();
     let late_ns = late.began_ns.saturating_sub(late.due_ns);
     Some(longest_ns.unwrap_or_default() as f64 >= MACHINES_SHARE * late_ns as f64)
-}
-
-fn now_ns() -> u64 {
-    let now = clock_gettime(rustix::time::ClockId::Monotonic);
-    now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
-}
-
-fn sleep_until(due_ns: u64) {
-    let due = Timespec { tv_sec: (due_ns / NS_PER_S) as i64, tv_nsec: (due_ns % NS_PER_S) as i64 };
-    while clock_nanosleep_absolute(ClockId::Monotonic, &due) == Err(rustix::io::Errno::INTR) {}
 }
 
 /// Sees what an idle machine does for so long.

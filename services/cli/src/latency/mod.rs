@@ -13,7 +13,7 @@ use crate::failure::{Failure, Status};
 use crate::observer::RunObserver;
 use crate::outcome::Outcome;
 use crate::output_directory::{LATENCY, OutputDirectory};
-use crate::prepare::prepare_with;
+use crate::prepare::prepare_paced;
 use crate::print::print_out;
 use crate::supervisor;
 use core::time::Duration;
@@ -43,9 +43,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
     let Some(scenario) = arguments.scenario() else {
         return Err(Failure::usage("a scenario is missing, or --compare A.json B.json"));
     };
-    let by_the_clock = [("clock".to_owned(), "wall".to_owned())];
-    let overrides = if arguments.real_time { &by_the_clock[..] } else { &[] };
-    let mut prepared = prepare_with(&scenario, overrides)?;
+    let mut prepared = prepare_paced(&scenario, arguments.real_time)?;
     prepared.is_empty = arguments.empty;
     let run = &prepared.run;
     if run.ticks <= 2 * WARM_UP_TICKS {
@@ -54,10 +52,8 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
             "duration_s: expected more than {least} s, to have something left"
         )));
     }
-    let out = match &arguments.results.out {
-        Some(path) => OutputDirectory::open(path, arguments.results.force)?,
-        None => OutputDirectory::fresh(&format!("latency-{}", run.scenario.name), run.scenario.seed)?,
-    };
+    let name = format!("latency-{}", run.scenario.name);
+    let out = OutputDirectory::of(&arguments.results, &name, run.scenario.seed)?;
     let fifo_priority = run.scenario.placement.fifo_priority;
     let machine_idle = machine::idle(IDLE, fifo_priority);
     let mut observer = RunObserver::new(&prepared, &arguments.results, &out)?.measuring(&prepared);

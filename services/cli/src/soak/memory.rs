@@ -1,5 +1,6 @@
 //! How the memory of processes grows with time.
 
+use crate::process_status::ProcessStatus;
 use mikoshi_runtime::Role;
 use std::collections::BTreeMap;
 
@@ -57,12 +58,8 @@ fn slope(samples: &[Sample]) -> f64 {
 /// What a process has that no other has and no file: its heap and stacks, in memory or swapped out. Pages of
 /// programs and of shared memory come and go as the system likes.
 fn own_kib(pid: u32) -> Option<f64> {
-    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
-    let kib_of = |name: &str| {
-        let line = status.lines().find_map(|line| line.strip_prefix(name));
-        line?.trim().strip_suffix(" kB")?.parse::<f64>().ok()
-    };
-    Some(kib_of("RssAnon:")? + kib_of("VmSwap:")?)
+    let status = ProcessStatus::of(pid)?;
+    Some((status.number("RssAnon")? + status.number("VmSwap")?) as f64)
 }
 
 #[cfg(test)]

@@ -121,11 +121,7 @@ impl Supervisor {
         if is_paced(prepared) {
             board.set_paced();
         }
-        let join = |role| {
-            Member::join(directory, role, WaitPolicy::default(), Entry::Vacant).map_err(Failure::fault)
-        };
-        let member = join(Role::Supervisor)?;
-        let tap = IceoryxTap::open(directory, join(Role::Tap)?, schedule).map_err(Failure::fault)?;
+        let (member, tap) = take_places(prepared, directory)?;
         let requests = Requests::listen(directory).map_err(Failure::fault)?;
         let mut children = Children::of(directory, logs);
         for (service, label, robot) in services_of(prepared) {
@@ -142,11 +138,7 @@ impl Supervisor {
         let (run, schedule) = (&prepared.run, &prepared.schedule);
         fs::create_dir_all(logs).map_err(|error| Failure::fault(error).context(logs.display()))?;
         let succession = Succession::with_limit(run.scenario.supervision.restart_limit);
-        let join = |role| {
-            Member::join(directory, role, WaitPolicy::default(), Entry::Vacant).map_err(Failure::fault)
-        };
-        let member = join(Role::Supervisor)?;
-        let tap = IceoryxTap::open(directory, join(Role::Tap)?, schedule).map_err(Failure::fault)?;
+        let (member, tap) = take_places(prepared, directory)?;
         let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
         let requests = Requests::listen(directory).map_err(Failure::fault)?;
         let children = Children::adopt(directory, logs, services_of(prepared))?;
@@ -323,6 +315,15 @@ impl Supervisor {
         let least = self.service_states().map(|(_, state)| state).min();
         self.service_states().filter(|(_, state)| Some(*state) == least).map(|(service, _)| service).collect()
     }
+}
+
+/// The places of a supervisor and its tap, which nobody has.
+fn take_places(prepared: &Prepared, directory: &Path) -> Result<(Member, IceoryxTap), Failure> {
+    let join =
+        |role| Member::join(directory, role, WaitPolicy::default(), Entry::Vacant).map_err(Failure::fault);
+    let member = join(Role::Supervisor)?;
+    let tap = IceoryxTap::open(directory, join(Role::Tap)?, &prepared.schedule).map_err(Failure::fault)?;
+    Ok((member, tap))
 }
 
 /// All services of a run: which, what people call it, and the robot that it controls.
