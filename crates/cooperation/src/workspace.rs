@@ -6,10 +6,11 @@ use crate::{
 use mikoshi_spatial::{CoordinateFrame, Hand, Object, Pose, Tip, Twist, World, Wrench, exp, log};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
-/// Attitude change \[rad\] below which the mean of the tips counts as found.
-const MEAN_TOLERANCE_RAD: f64 = 1e-13;
-/// A round leaves a share of the error that is the square of the tips' spread \[rad\] over twelve: two or
-/// three rounds do for tips that belong to one object. The bound is for those that don't.
+/// Attitude change times the tips' spread \[rad²\] below which the mean of the tips counts as found: what a deviation is
+/// wrong by from which that change is subtracted is half of it.
+const MEAN_TOLERANCE_RAD2: f64 = 1e-13;
+/// A round leaves a share of the error that is the square of the tips' spread \[rad\] over twelve: two
+/// rounds do for tips that belong to one object. The bound is for those that don't.
 const MEAN_ROUNDS: usize = 8;
 
 /// Buffers for n arms. Nothing in them outlives a call.
@@ -130,17 +131,22 @@ pub(crate) fn mean_pose(
         weights.iter().zip(tips).map(|(weight, tip)| tip.translation * *weight).sum();
     let mut attitude = tips.first().map_or_else(UnitQuaternion::identity, |tip| tip.rotation);
     for round in 1..=MEAN_ROUNDS {
-        let mut correction = Vector3::zeros();
+        let (mut correction, mut spread_squared) = (Vector3::zeros(), 0.0_f64);
         for ((weight, tip), deviation) in weights.iter().zip(tips).zip(deviations.iter_mut()) {
             let angular = log(&(tip.rotation * attitude.inverse()));
             correction += angular * *weight;
+            if *weight != 0.0 {
+                spread_squared = spread_squared.max(angular.norm_squared());
+            }
             *deviation = Twist::new(tip.translation - position, angular);
         }
-        if correction.norm() <= MEAN_TOLERANCE_RAD || round == MEAN_ROUNDS {
+        attitude = exp(&correction) * attitude;
+        attitude.renormalize_fast();
+        let doubt_squared = correction.norm_squared() * spread_squared;
+        if doubt_squared <= MEAN_TOLERANCE_RAD2 * MEAN_TOLERANCE_RAD2 || round == MEAN_ROUNDS {
+            deviations.iter_mut().for_each(|deviation| deviation.angular -= correction);
             break;
         }
-        attitude = exp(&correction) * attitude;
-        attitude.renormalize();
     }
     Pose::new(position, attitude)
 }

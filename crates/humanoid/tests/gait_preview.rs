@@ -3,7 +3,8 @@
 
 use mikoshi_humanoid::gait::solve_discrete_riccati;
 use mikoshi_humanoid::gait::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError, ZmpReference};
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use proptest::prelude::*;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -104,7 +105,7 @@ fn the_zmp_of_a_known_walk_is_followed_within_millimetres() {
     let (mut worst, mut sum, mut com_y) = (0.0_f64, 0.0, 0.0_f64);
     let ticks = 1600;
     for tick in 0..ticks {
-        let error = control.advance(&mut state, (tick..).map(|tick| reference.at(tick)));
+        let error = control.advance(&mut state, &reference.later(tick));
         worst = worst.max(error.norm());
         sum += error.norm_squared();
         com_y = com_y.max(state.com.y.abs());
@@ -124,8 +125,8 @@ fn where_the_origin_lies_makes_no_difference() {
     let mut near = PreviewState::at_rest(reference.at(0));
     let mut away = PreviewState::at_rest(reference.at(0) + far);
     for tick in 0..1600 {
-        control.advance(&mut near, (tick..).map(|tick| reference.at(tick)));
-        control.advance(&mut away, (tick..).map(|tick| reference.at(tick) + far));
+        control.advance(&mut near, &reference.later(tick));
+        control.advance(&mut away, &reference.later(tick).mapped(|point| point + far));
         assert!((away.com - far - near.com).norm() < 1e-6, "tick {tick}: {}", away.com - far - near.com);
     }
 }
@@ -136,7 +137,7 @@ fn a_robot_at_rest_over_its_reference_stays_there() {
     let place = Vector2::new(3.2, -1.7);
     let mut state = PreviewState::at_rest(place);
     for _ in 0..2000 {
-        control.advance(&mut state, core::iter::repeat(place));
+        control.advance(&mut state, &ZmpReference::resting(place));
     }
     assert!((state.com - place).norm() < 1e-9);
 }
@@ -148,7 +149,7 @@ fn a_plan_that_changes_at_short_notice_moves_the_zmp_by_centimetres_only() {
     let mut state = PreviewState::at_rest(Vector2::zeros());
     let mut worst = 0.0_f64;
     for tick in 0..800 {
-        control.advance(&mut state, (tick..).map(|tick| walk.at(tick)));
+        control.advance(&mut state, &walk.later(tick));
         worst = worst.max((control.zmp(&state) - walk.at(tick + 1)).norm());
     }
     assert!(worst < 0.045, "{worst}");
@@ -164,7 +165,7 @@ fn the_linear_law_is_what_remains_without_a_limit() {
     let (mut a, mut b) = (PreviewState::at_rest(Vector2::zeros()), PreviewState::at_rest(Vector2::zeros()));
     for tick in 0..1600 {
         for (control, state) in [(&limited, &mut a), (&linear, &mut b)] {
-            control.advance(state, (tick..).map(|tick| reference.at(tick)));
+            control.advance(state, &reference.later(tick));
         }
     }
     assert!((a.com - b.com).norm() < 1e-12, "a plan that was known in time never meets the limit");
@@ -177,8 +178,53 @@ fn no_state_is_out_of_reach_of_the_limited_law() {
         let mut state = PreviewState::at_rest(Vector2::new(position, 0.0));
         state.com_velocity.x = velocity;
         for _ in 0..3000 {
-            control.advance(&mut state, core::iter::repeat(Vector2::zeros()));
+            control.advance(&mut state, &ZmpReference::resting(Vector2::zeros()));
         }
         assert!(state.com.norm() < 1e-3, "from {position} m, {velocity} m/s to {}", state.com);
+    }
+}
+
+/// Of any number of weight shifts, begun in the past or yet to come.
+fn any_reference() -> impl Strategy<Value = ZmpReference> {
+    let point = || (-1.0..1.0, -1.0..1.0).prop_map(|(x, y)| Vector2::new(x, y));
+    let shift = (0_i64..150, 0_i64..60, point());
+    (point(), -200_i64..300, proptest::collection::vec(shift, 0..5)).prop_map(|(rest, begin, shifts)| {
+        let mut tick = begin;
+        shifts.into_iter().fold(ZmpReference::resting(rest), |reference, (pause, length, point)| {
+            let from = tick + pause;
+            tick = from + length;
+            reference.shift(from, tick, point)
+        })
+    })
+}
+
+proptest! {
+    #[test]
+    fn the_jerk_is_that_of_the_law_tick_by_tick(
+        reference in any_reference(),
+        com in -1.0..1.0,
+        velocity in -1.0..1.0,
+        acceleration in -3.0..3.0,
+        error_sum in -0.1..0.1,
+    ) {
+        let config = PreviewConfig { deviation_max_m: f64::INFINITY, ..PreviewConfig::default() };
+        let control = PreviewControl::new(&config).expect("solvable");
+        let along = |value| Vector2::new(value, 0.0);
+        let mut state = PreviewState {
+            com: along(com),
+            com_velocity: along(velocity),
+            com_acceleration: along(acceleration),
+            error_sum: along(error_sum),
+        };
+        let zmp = control.zmp(&state).x;
+        control.advance(&mut state, &reference);
+
+        let preview: f64 =
+            (1..).zip(control.gain_preview()).map(|(tick, gain)| gain * reference.at(tick).x).sum();
+        let jerk = -control.gain_error() * (error_sum + zmp - reference.at(0).x)
+            - (control.gain_state() * Vector3::new(com, velocity, acceleration)).x
+            - preview;
+        let felt = (state.com_acceleration.x - acceleration) / config.control_period_s;
+        prop_assert!((felt - jerk).abs() < 1e-9 * (1e4 + jerk.abs()), "{felt} {jerk}");
     }
 }

@@ -38,6 +38,7 @@
 #![allow(non_snake_case)]
 
 mod euler;
+mod finite;
 mod frame;
 mod pose;
 mod rotation;

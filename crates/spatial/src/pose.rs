@@ -1,6 +1,6 @@
 //! Rigid poses between two coordinate frames.
 
-use crate::{CoordinateFrame, Twist, rotation};
+use crate::{CoordinateFrame, Twist, finite::are_finite, rotation};
 use core::marker::PhantomData;
 use core::ops::Mul;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -71,13 +71,13 @@ impl<A: CoordinateFrame, B: CoordinateFrame> Pose<A, B> {
     /// left.
     pub fn displaced(&self, displacement: &Twist<A>) -> Self {
         let mut rotation = rotation::exp(&displacement.angular) * self.rotation;
-        rotation.renormalize();
+        rotation.renormalize_fast();
         Self::new(self.translation + displacement.linear, rotation)
     }
 
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
-        self.translation.iter().chain(&self.rotation.coords).all(|value| value.is_finite())
+        are_finite(&self.translation) & are_finite(&self.rotation.coords)
     }
 
     /// `[x, y, z, qw, qx, qy, qz]`.
@@ -92,7 +92,7 @@ impl<A: CoordinateFrame, B: CoordinateFrame> Pose<A, B> {
         let [x, y, z, qw, qx, qy, qz] = *array;
         let quaternion = Quaternion::new(qw, qx, qy, qz);
         let excess = quaternion.norm() - 1.0;
-        let is_valid = array.iter().all(|value| value.is_finite()) && excess.abs() < 1e-6;
+        let is_valid = are_finite(array) & (excess.abs() < 1e-6);
         // Normalising what is normalised would change its last bits, and a pose that is stored and read
         // every tick would wander.
         let rotation = if excess.abs() <= 4.0 * f64::EPSILON {

@@ -1,6 +1,6 @@
 //! Six-vectors: twists and wrenches, in the axes of one coordinate frame.
 
-use crate::{CoordinateFrame, Pose};
+use crate::{CoordinateFrame, Pose, finite::are_finite};
 use core::marker::PhantomData;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub};
 use nalgebra::{Vector3, Vector6};
@@ -59,7 +59,7 @@ macro_rules! six_vector {
             }
             /// Whether every component is finite.
             pub fn is_finite(&self) -> bool {
-                self.$first.iter().chain(&self.$second).all(|value| value.is_finite())
+                are_finite(&self.$first) & are_finite(&self.$second)
             }
         }
 

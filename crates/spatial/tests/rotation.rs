@@ -146,3 +146,17 @@ proptest! {
         prop_assert_eq!(skew(&v).transpose(), -skew(&v));
     }
 }
+
+#[test]
+fn series_of_small_rotations_go_over_into_the_functions_without_a_step() {
+    // A hundred steps on each side of where they meet, and far below.
+    for step in 0..400 {
+        let angle = 1e-2 * (1.0 + 1e-4 * f64::from(step - 100)) * if step < 300 { 1.0 } else { 1e-3 };
+        let v = Vector3::new(0.6, 0.0, -0.8) * angle;
+        let q = exp(&v);
+        let sine = (0.5 * v.norm()).sin();
+        assert!((q.imag().norm() - sine).abs() <= 4e-16 * sine, "exp of {angle}");
+        assert!((q.w - (0.5 * v.norm()).cos()).abs() <= 2.3e-16, "exp of {angle}");
+        assert!((log(&q) - v).norm() <= 5e-16 * angle, "log of exp of {angle}");
+    }
+}

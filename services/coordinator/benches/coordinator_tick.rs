@@ -65,11 +65,17 @@ fn whole_tick_us(robots: usize) -> f64 {
     let coordinator = Coordinator::new(&run).expect("a coordinator");
     let (mut state, mut scratch) = (coordinator.initial_state().expect("a state"), coordinator.scratch());
     let mut out = CoordinatorOutputs::default();
-    let frames = frames(&run);
+    let mut frames = frames(&run);
     let mut tick = 0;
     let us = mean_us(|| {
         let result = coordinator.tick(tick, &mut state, &mut scratch, black_box(&frames).iter(), &mut out);
         assert!(result.is_ok(), "{result:?}");
+        // Hands are where they are asked to be, and apply what they are asked to.
+        for (frame, command) in frames.iter_mut().zip(&out.commands) {
+            frame.hand_pose = command.hand_pose_ref;
+            frame.hand_pose_commanded = command.hand_pose_ref;
+            frame.hand_wrench = command.hand_wrench_ref;
+        }
         tick += 1;
     });
     assert_eq!(out.team_state.team_mode, mode::CARRY);
@@ -98,7 +104,7 @@ fn run_of(robots: usize) -> RunSpec {
     mikoshi_resolution::resolve(&loaded).expect("it resolves")
 }
 
-/// What the robots say: their hands are where the run begins, and each pulls a little.
+/// What the robots say at first: their hands are where the run begins, and each pulls a little.
 fn frames(run: &RunSpec) -> Vec<RobotState> {
     let object = &run.scenario.object;
     let X_WA = Pose::<World, Object>::new(Vector3::from(object.position_m), UnitQuaternion::identity());

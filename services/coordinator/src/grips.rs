@@ -11,6 +11,7 @@ use mikoshi_config::scenario::{LostGrasp, Scenario};
 use mikoshi_cooperation::{Gap, HandInput, HybridState, Parting, PartingLimits};
 use mikoshi_ipc_types::{MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, stop_cause};
 use mikoshi_spatial::{Object, Pose, Twist, World, Wrench};
+use nalgebra::UnitQuaternion;
 
 /// By how much a robot's odometry may be off: in ten minutes of walking robots are not off by half of it.
 const ODOMETRY: Parting = Parting { m: 0.006, rad: 0.01 };
@@ -108,8 +109,10 @@ impl Grips {
         seen: &Seen<'_>,
     ) {
         (state.slipping, state.open) = ([0; MAX_HANDS_OF_TEAM], [0; MAX_HANDS_OF_TEAM]);
-        for (slot, wrench) in state.yielded_at_start.iter_mut().zip(seen.hand_wrench) {
-            *slot = self.yielded(seen, wrench).to_array();
+        let R_AW = seen.X_WA.rotation.inverse();
+        let of_hands = seen.hand_wrench.iter().take(seen.hands.len());
+        for (slot, wrench) in state.yielded_at_start.iter_mut().zip(of_hands) {
+            *slot = self.yielded(&R_AW, wrench).to_array();
         }
         self.remember(state, hybrid, seen, &[Twist::zero(); MAX_HANDS_OF_TEAM]);
     }
@@ -131,35 +134,37 @@ impl Grips {
     }
 
     /// Where each hand's tip has the object, less where it had it at the start, against the mean of all: what they apply to
-    /// something that holds the object displaces all alike.
-    pub(crate) fn gaps(
+    /// something that holds the object displaces all alike. `gaps` has one for each hand of the team.
+    pub(crate) fn find_gaps(
         &self,
         state: &GripState,
         hybrid: &HybridState<MAX_HANDS_OF_TEAM>,
         seen: &Seen<'_>,
-    ) -> [Option<Gap>; MAX_HANDS_OF_TEAM] {
-        let mut gaps = [None; MAX_HANDS_OF_TEAM];
+        gaps: &mut [Option<Gap>],
+    ) {
+        let R_AW = seen.X_WA.rotation.inverse();
         let at_start = state.at_start.iter().zip(&state.yielded_at_start).zip(seen.hand_wrench);
         for (arm, (gap, ((at_start, yielded_at_start), wrench))) in gaps.iter_mut().zip(at_start).enumerate()
         {
-            let at_start = Twist::<Object>::from_array(at_start).expressed_in(seen.X_WA);
-            let doubt = (self.yielded(seen, wrench) - Twist::from_array(yielded_at_start)) * DOUBT;
-            let tip = self.tip(hybrid, seen, arm);
-            *gap = tip.map(|(tip, hand)| Gap {
-                tip: tip - at_start,
-                lever: hand.pose.translation - seen.X_WA.translation,
-                doubt: Parting { m: doubt.linear.norm(), rad: doubt.angular.norm() },
+            *gap = self.tip(hybrid, seen, arm).map(|(tip, hand)| {
+                let at_start = Twist::<Object>::from_array(at_start).expressed_in(seen.X_WA);
+                let doubt = (self.yielded(&R_AW, wrench) - Twist::from_array(yielded_at_start)) * DOUBT;
+                Gap {
+                    tip: tip - at_start,
+                    lever: hand.pose.translation - seen.X_WA.translation,
+                    doubt: Parting { m: doubt.linear.norm(), rad: doubt.angular.norm() },
+                }
             });
         }
         let count = gaps.iter().flatten().count().max(1) as f64;
         let mean = gaps.iter().flatten().fold(Twist::zero(), |sum, gap| sum + gap.tip) * (1.0 / count);
         gaps.iter_mut().flatten().for_each(|gap| gap.tip = gap.tip - mean);
-        gaps
     }
 
     /// How far a grasp yields to a wrench, at the hand, in the object's axes.
-    fn yielded(&self, seen: &Seen<'_>, wrench: &[f64; 6]) -> Twist<Object> {
-        self.compliance.grip_yield(&Wrench::from_array(wrench)).expressed_in(&seen.X_WA.inverse())
+    fn yielded(&self, R_AW: &UnitQuaternion<f64>, wrench: &[f64; 6]) -> Twist<Object> {
+        let in_world = self.compliance.grip_yield(&Wrench::from_array(wrench));
+        Twist::new(R_AW * in_world.linear, R_AW * in_world.angular)
     }
 
     /// From the team's object to where the tip of an arm that takes part has it, less what its grasp yields.
@@ -176,10 +181,8 @@ impl Grips {
     }
 
     /// How far each hand has parted from its grip, as a multiple of what it may.
-    pub(crate) fn slips(&self, gaps: &[Option<Gap>; MAX_HANDS_OF_TEAM]) -> [f64; MAX_HANDS_OF_TEAM] {
-        let mut slips = [0.0; MAX_HANDS_OF_TEAM];
-        self.limits.slips(gaps, &self.hands_of_robots, &mut slips);
-        slips
+    pub(crate) fn find_slips(&self, gaps: &[Option<Gap>], slips: &mut [f64; MAX_HANDS_OF_TEAM]) {
+        self.limits.slips(gaps, &self.hands_of_robots, slips);
     }
 
     /// One tick of hands that shall hold: which of those that take part are lost from now on.

@@ -17,8 +17,8 @@ use mikoshi_cooperation::{
     Control, FrameCorrection, HandInput, HybridLaw, HybridState, Landmark, LandmarkParameters, Sighting,
 };
 use mikoshi_ipc_types::{MAX_HANDS_OF_TEAM, MAX_ROBOTS};
-use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
-use nalgebra::{UnitQuaternion, Vector3};
+use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench, exp};
+use nalgebra::Vector3;
 
 /// Robots that walk with .04 m/s part by .25 mm/s, and by four times that where feet are believed to stand where
 /// they were sent: this leaves them 1 mm off, or 4. Their sway of some millimetres comes and goes with every second
@@ -68,10 +68,10 @@ impl Default for OdometryState {
 }
 
 impl OdometryState {
-    /// `X_WO` of each robot; `None` if one is none.
-    pub(crate) fn frames(&self) -> Option<[Pose<World, Odometry>; MAX_ROBOTS]> {
+    /// `X_WO` of each of so many robots; `None` if one is none.
+    pub(crate) fn frames(&self, robots: usize) -> Option<[Pose<World, Odometry>; MAX_ROBOTS]> {
         let mut poses = [Pose::identity(); MAX_ROBOTS];
-        for (pose, frame) in poses.iter_mut().zip(&self.frames) {
+        for (pose, frame) in poses.iter_mut().zip(&self.frames).take(robots) {
             *pose = frame.pose()?;
         }
         Some(poses)
@@ -82,8 +82,7 @@ impl LevelFrame {
     fn pose(&self) -> Option<Pose<World, Odometry>> {
         let Self { x_m, y_m, yaw_rad } = *self;
         let is_valid = [x_m, y_m, yaw_rad].iter().all(|value| value.is_finite());
-        let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
-        is_valid.then(|| Pose::new(Vector3::new(x_m, y_m, 0.0), rotation))
+        is_valid.then(|| Pose::new(Vector3::new(x_m, y_m, 0.0), exp(&Vector3::new(0.0, 0.0, yaw_rad))))
     }
 
     fn corrected(&self, correction: &FrameCorrection) -> Self {

@@ -96,12 +96,21 @@ unsafe impl Pod for CoordinatorState {}
 /// Workspaces: filled with NaN between ticks they change nothing.
 #[derive(Clone, Debug)]
 pub struct CoordinatorScratch {
-    law: HybridScratch,
-    formation: Formation,
+    team: TeamScratch,
     law_output: HybridOutput,
     hands: Vec<HandInput>,
     force_ref: GeneralizedForce,
     position_ref: GeneralizedPosition,
+}
+
+/// Of what is found anew in every tick of the team as it is formed.
+#[derive(Clone, Debug)]
+struct TeamScratch {
+    law: HybridScratch,
+    formation: Formation,
+    /// What each hand applies to the object, filtered.
+    hand_wrench: Vec<[f64; 6]>,
+    gaps: Vec<Option<Gap>>,
 }
 
 /// What a tick has found.
@@ -208,8 +217,12 @@ impl Coordinator {
     pub fn scratch(&self) -> CoordinatorScratch {
         let arms = self.law.arms();
         CoordinatorScratch {
-            law: self.law.scratch(),
-            formation: self.law.internal_forces().whole().clone(),
+            team: TeamScratch {
+                law: self.law.scratch(),
+                formation: self.law.internal_forces().whole().clone(),
+                hand_wrench: vec![[0.0; 6]; arms],
+                gaps: vec![None; arms],
+            },
             law_output: self.law.output(),
             hands: Vec::with_capacity(arms),
             force_ref: GeneralizedForce::zero(arms),
@@ -227,11 +240,10 @@ impl Coordinator {
         robots: impl Iterator<Item = &'a RobotState> + Clone,
         out: &mut CoordinatorOutputs,
     ) -> Result<(), CoordinateError> {
-        let CoordinatorScratch { law: law_scratch, formation, law_output, hands, force_ref, position_ref } =
-            scratch;
-        self.law.form(&state.hybrid, formation).map_err(|_| CoordinateError::State)?;
+        let CoordinatorScratch { team, law_output, hands, force_ref, position_ref } = scratch;
+        self.law.form(&state.hybrid, &mut team.formation).map_err(|_| CoordinateError::State)?;
         let present = self.grips.present(&state.hybrid);
-        let X_WO = state.odometry.frames().ok_or(CoordinateError::State)?;
+        let X_WO = state.odometry.frames(self.hands_of_robots.len()).ok_or(CoordinateError::State)?;
         read_hands(robots.clone(), &self.hands_of_robots, &X_WO, hands)?;
         let wishes = Wishes::of(robots.clone());
 
@@ -242,7 +254,7 @@ impl Coordinator {
         self.safety.look(&mut safety, tick, of_team, state.clock.is_standing(), state.operator_word);
         let is_stopped = safety.is_stopped();
         let is_free = self.job.is_in_the_air(&phase) && !self.presses;
-        let (hand_wrench, grasp_yield) = self.grasp_yield(state, formation, hands, is_free)?;
+        let grasp_yield = self.grasp_yield(state, team, hands, is_free)?;
         // Control ends with the first tick of doubt, and starts again after the last.
         let is_blind = safety.is_blind() || state.safety.is_blind();
         let is_hybrid = carries && !is_blind;
@@ -276,7 +288,7 @@ impl Coordinator {
         });
         let inputs = HybridInputs { hands, grasp_yield, reference };
         let law = if phase.is_resting() { &self.resting_law } else { &self.law };
-        law.act(&mut state.hybrid, law_scratch, &inputs, law_output).map_err(|_| CoordinateError::Law)?;
+        law.act(&mut state.hybrid, &mut team.law, &inputs, law_output).map_err(|_| CoordinateError::Law)?;
         if let Some(leading) = self.leading.as_ref().filter(|_| is_led) {
             let object = (&X_WA_ref, &motion.twist());
             leading
@@ -287,7 +299,8 @@ impl Coordinator {
         if is_blind && carries {
             carry_hands(state, &mut law_output.hands, &X_WA_ref);
         }
-        (state.motion, state.clock, state.hand_wrench, state.safety) = (motion, clock, hand_wrench, safety);
+        (state.motion, state.clock, state.safety) = (motion, clock, safety);
+        state.hand_wrench.iter_mut().zip(&team.hand_wrench).for_each(|(kept, wrench)| *kept = *wrench);
         let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
         move_open_hands(state, &mut law_output.hands, hand_step_m);
 
@@ -297,12 +310,11 @@ impl Coordinator {
         out.team_state.odometry_pose = X_WO.map(|X_WO| X_WO.to_array());
         out.team_state.speed_share = speed_share;
         if is_hybrid && !is_led && !state.clock.is_standing() {
-            self.correct_odometry(state, formation, hands, law_output);
+            self.correct_odometry(state, &team.formation, hands, law_output);
         }
         if carries && !is_blind {
             let now = Now { tick, law: law_output, hands, is_free };
-            let scratch = (&mut *law_scratch, &mut *formation);
-            self.watch_grips(state, scratch, &now, robots.clone(), &mut out.team_state.hand_slip)?;
+            self.watch_grips(state, team, &now, robots.clone(), &mut out.team_state.hand_slip)?;
         }
 
         if is_blind && !safety.is_blind() && carries {
@@ -361,24 +373,23 @@ impl Coordinator {
     fn watch_grips<'a>(
         &self,
         state: &mut CoordinatorState,
-        scratch: (&mut HybridScratch, &mut Formation),
+        team: &mut TeamScratch,
         now: &Now<'_>,
         robots: impl Iterator<Item = &'a RobotState>,
         hand_slip: &mut [f64; MAX_HANDS_OF_TEAM],
     ) -> Result<(), CoordinateError> {
         let CoordinatorState { grips, hybrid, hand_wrench, .. } = state;
         let is_led = self.leading.is_some();
-        let mut gaps = [None; MAX_HANDS_OF_TEAM];
         // A leader's followers are not where the law would have them.
         if !is_led {
             let seen = grips::Seen { X_WA: &now.law.position.external, hands: now.hands, hand_wrench };
-            gaps = self.grips.gaps(grips, hybrid, &seen);
+            self.grips.find_gaps(grips, hybrid, &seen, &mut team.gaps);
+            self.grips.find_slips(&team.gaps, hand_slip);
         }
-        *hand_slip = self.grips.slips(&gaps);
         let Some(loss) = self.grips.find_loss(grips, hybrid, hand_slip, robots) else { return Ok(()) };
         grips.loss_cause = loss.cause;
         let are_too_few = self.grips.are_too_few(hybrid, &loss);
-        let is_formed = !is_led && self.do_without(state, scratch, now, loss.hands, &gaps)?;
+        let is_formed = !is_led && self.do_without(state, team, now, loss.hands)?;
         let is_blind = !is_led && !is_formed;
         if are_too_few {
             state.safety.stop(stop_cause::TOO_FEW_HANDS, loss.robot, is_blind);
@@ -392,28 +403,27 @@ impl Coordinator {
     fn do_without(
         &self,
         state: &mut CoordinatorState,
-        (law_scratch, formation): (&mut HybridScratch, &mut Formation),
+        team: &mut TeamScratch,
         now: &Now<'_>,
         lost: u64,
-        gaps: &[Option<Gap>; MAX_HANDS_OF_TEAM],
     ) -> Result<bool, CoordinateError> {
         let gone = grips::absent(&state.hybrid) | lost;
         let stays = |arm: usize| gone & 1 << arm == 0;
-        if self.law.internal_forces().form(stays, formation).is_err() {
+        if self.law.internal_forces().form(stays, &mut team.formation).is_err() {
             return Ok(false);
         }
         // Those who stay are seen off their grips by what the lost have brought into the mean: Σa is where they have it.
         let mut off = [Twist::zero(); MAX_HANDS_OF_TEAM];
         let mut mean = Twist::zero();
-        for ((off, gap), share) in off.iter_mut().zip(gaps).zip(formation.w_inverse()) {
+        for ((off, gap), share) in off.iter_mut().zip(&team.gaps).zip(team.formation.w_inverse()) {
             *off = gap.map_or_else(Twist::zero, |gap| gap.tip);
             mean += *off * *share;
         }
         off.iter_mut().for_each(|off| *off = *off - mean);
         let X_WA = now.law.position.external.displaced(&mean);
-        let (_, grasp_yield) = self.grasp_yield(state, formation, now.hands, now.is_free)?;
+        let grasp_yield = self.grasp_yield(state, team, now.hands, now.is_free)?;
         let X_WB = X_WA.displaced(&-grasp_yield);
-        if self.law.reform(&mut state.hybrid, law_scratch, &X_WB, now.hands, stays).is_err() {
+        if self.law.reform(&mut state.hybrid, &mut team.law, &X_WB, now.hands, stays).is_err() {
             return Ok(false);
         }
         let seen = grips::Seen { X_WA: &X_WA, hands: now.hands, hand_wrench: &state.hand_wrench };
@@ -463,8 +473,8 @@ impl Coordinator {
         let is_in_reach = |(hand, stick): (&HandInput, &VirtualStick)| {
             // At the grasp the stick's tip coincides with the object's frame.
             let place = self.X_WA_start * stick.X_HB.inverse().relabel::<Object, Hand>();
-            let gap = place.displacement_to(&hand.pose);
-            gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
+            let way = hand.pose.translation - place.translation;
+            way.norm() <= REACH_M && place.displacement_to(&hand.pose).angular.norm() <= REACH_RAD
         };
         let mut holding = robots.clone().zip(present);
         Seen {
@@ -478,22 +488,22 @@ impl Coordinator {
         }
     }
 
-    /// How far the object is from where rigid grasps would have it, and the filtered wrenches that say so.
+    /// How far the object is from where rigid grasps would have it, and in `team` the filtered wrenches that say so.
     fn grasp_yield(
         &self,
         state: &CoordinatorState,
-        formation: &Formation,
+        team: &mut TeamScratch,
         hands: &[HandInput],
         is_free: bool,
-    ) -> Result<([[f64; 6]; MAX_HANDS_OF_TEAM], Twist<World>), CoordinateError> {
+    ) -> Result<Twist<World>, CoordinateError> {
         let mut sticks = [VirtualStick { X_HB: Pose::identity() }; MAX_HANDS_OF_TEAM];
         for (stick, array) in sticks.iter_mut().zip(&state.hybrid.sticks).take(hands.len()) {
             stick.X_HB = Pose::from_array(array).ok_or(CoordinateError::State)?;
         }
-        let mut hand_wrench = state.hand_wrench;
+        let TeamScratch { formation, hand_wrench, .. } = team;
+        hand_wrench.iter_mut().zip(&state.hand_wrench).for_each(|(wrench, last)| *wrench = *last);
         let hands = hands.iter().zip(&sticks);
-        let found = self.compliance.object_yield(&mut hand_wrench, hands, formation.w_inverse(), is_free);
-        Ok((hand_wrench, found))
+        Ok(self.compliance.object_yield(hand_wrench, hands, formation.w_inverse(), is_free))
     }
 
     fn write_commands(
@@ -531,8 +541,10 @@ impl CoordinatorScratch {
     /// Overwrites every number with NaN.
     pub fn poison(&mut self) {
         let nan = f64::NAN;
-        self.law.poison();
-        self.formation.poison();
+        self.team.law.poison();
+        self.team.formation.poison();
+        self.team.hand_wrench.fill([nan; 6]);
+        self.team.gaps.fill(None);
         self.hands.clear();
         self.force_ref.external = Wrench::from_array(&[nan; 6]);
         self.force_ref.internal.fill(Wrench::from_array(&[nan; 6]));
@@ -627,20 +639,19 @@ fn write_team_state(
 ) {
     let measured = &law.position.external;
     let object_pose_ref = reference.map_or(*measured, |(_, position)| position.external);
+    // In place: it is large.
     let team_state = &mut out.team_state;
-    *team_state = TeamState {
-        object_pose: measured.to_array(),
-        object_pose_ref: object_pose_ref.to_array(),
-        object_twist_ref: state.motion.twist,
-        step_clock: state.clock.clock,
-        team_mode: mode_of(state, phase),
-        operator_word: state.safety.operator_word,
-        stop_cause: state.safety.cause,
-        stop_robot: state.safety.robot,
-        absent_hands: grips::absent(&state.hybrid),
-        loss_cause: state.grips.loss_cause,
-        ..TeamState::zeroed()
-    };
+    *team_state = TeamState::zeroed();
+    team_state.object_pose = measured.to_array();
+    team_state.object_pose_ref = object_pose_ref.to_array();
+    team_state.object_twist_ref = state.motion.twist;
+    team_state.step_clock = state.clock.clock;
+    team_state.team_mode = mode_of(state, phase);
+    team_state.operator_word = state.safety.operator_word;
+    team_state.stop_cause = state.safety.cause;
+    team_state.stop_robot = state.safety.robot;
+    team_state.absent_hands = grips::absent(&state.hybrid);
+    team_state.loss_cause = state.grips.loss_cause;
     write_force(&law.force, &mut team_state.generalized_force);
     if let Some((force_ref, _)) = reference {
         write_force(force_ref, &mut team_state.generalized_force_ref);

@@ -256,7 +256,7 @@ impl Gait {
         state.load = state.load.filtered_towards(&inputs.load, blend);
         let reference = self.zmp_reference(state, inputs);
         let load = state.load;
-        self.preview.advance(&mut state.preview, reference.samples().map(|zmp| load.extended_zmp(&zmp)));
+        self.preview.advance(&mut state.preview, &reference.mapped(|zmp| load.extended_zmp(zmp)));
         state.zmp_ref = reference.at(1);
         self.reference(state)
     }

@@ -1,6 +1,7 @@
 //! Preview control of the cart-table model (Kajita et al., ICRA 2003; Katayama et al. 1985).
 
 use super::riccati::{feedback_gain, solve_discrete_riccati};
+use super::zmp_reference::{Line, ZmpReference};
 use crate::balance::GRAVITY_M_S2;
 use nalgebra::{Matrix3, Matrix4, RowVector3, Vector2, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
@@ -98,8 +99,30 @@ pub struct PreviewControl {
     gain_error: f64,
     gain_state: RowVector3<f64>,
     gain_preview: Vec<f64>,
+    gain_sums: Vec<GainSums>,
     deviation_max: f64,
     slope_beyond: f64,
+}
+
+/// Gains of the preview added up from 1 to some j.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct GainSums {
+    /// Σ Gp(i).
+    sum: f64,
+    /// Σ i Gp(i).
+    moment: f64,
+}
+
+impl GainSums {
+    /// For j = 0..=N.
+    fn of(gains: &[f64]) -> Vec<Self> {
+        let mut last = Self::default();
+        let sums = gains.iter().enumerate().map(|(index, gain)| {
+            last = Self { sum: last.sum + gain, moment: last.moment + (index + 1) as f64 * gain };
+            last
+        });
+        core::iter::once(Self::default()).chain(sums).collect()
+    }
 }
 
 impl PreviewControl {
@@ -153,6 +176,7 @@ impl PreviewControl {
             output,
             gain_error: k[0],
             gain_state: k.fixed_view::<1, 3>(0, 1).into_owned(),
+            gain_sums: GainSums::of(&gain_preview),
             gain_preview,
         })
     }
@@ -177,29 +201,13 @@ impl PreviewControl {
         state.com + state.com_acceleration * self.output.z
     }
 
-    /// One tick further. `zmp_ref` yields the reference now and then tick by tick; where it ends
-    /// before the horizon does, its last value stays. An empty one holds the state's own zero moment
-    /// point.
+    /// One tick further along a reference \[m\], whose tick 0 is now.
     ///
     /// Returns the zero moment point's error now \[m\].
-    pub fn advance(
-        &self,
-        state: &mut PreviewState,
-        zmp_ref: impl IntoIterator<Item = Vector2<f64>>,
-    ) -> Vector2<f64> {
-        let zmp = self.zmp(state);
-        let mut zmp_ref = zmp_ref.into_iter();
-        let now = zmp_ref.next().unwrap_or(zmp);
-        let error = zmp - now;
+    pub fn advance(&self, state: &mut PreviewState, zmp_ref: &ZmpReference) -> Vector2<f64> {
+        let error = self.zmp(state) - zmp_ref.at(0);
         state.error_sum += error;
-
-        let mut ahead = zmp_ref.next().unwrap_or(now);
-        let next_ref = ahead;
-        let mut preview = Vector2::zeros();
-        for gain in &self.gain_preview {
-            preview += ahead * *gain;
-            ahead = zmp_ref.next().unwrap_or(ahead);
-        }
+        let (next_ref, preview) = (zmp_ref.at(1), self.preview(zmp_ref));
         for axis in 0..2 {
             let x = Vector3::new(state.com[axis], state.com_velocity[axis], state.com_acceleration[axis]);
             let jerk = -self.gain_error * state.error_sum[axis] - (self.gain_state * x).x - preview[axis];
@@ -212,6 +220,19 @@ impl PreviewControl {
                 (next.x, next.y, next.z);
         }
         error
+    }
+
+    /// Σ_{j=1..N} Gp(j) p_ref(k+j): over the ticks of a line p_ref(k+j) = p₀ + s (j − j₀) it is
+    /// (p₀ − s j₀) Σ Gp(j) + s Σ j Gp(j), differences of two sums, however long the horizon is.
+    fn preview(&self, zmp_ref: &ZmpReference) -> Vector2<f64> {
+        let mut preview = Vector2::zeros();
+        for Line { ticks, through: (tick, point), slope } in zmp_ref.lines(1, self.gain_sums.len() as i64) {
+            let up_to = |tick: i64| self.gain_sums.get(tick as usize - 1).copied().unwrap_or_default();
+            let (before, after) = (up_to(ticks.start), up_to(ticks.end));
+            let (sum, moment) = (after.sum - before.sum, after.moment - before.moment);
+            preview += point * sum + slope * (moment - tick as f64 * sum);
+        }
+        preview
     }
 
     fn limited(&self, deviation: f64) -> f64 {

@@ -1,6 +1,7 @@
 //! The reference of the zero moment point, from footholds: it rests on the stance foot while one foot
 //! swings and shifts linearly while both stand.
 
+use core::ops::Range;
 use nalgebra::Vector2;
 
 /// More than a horizon of two steps needs.
@@ -58,8 +59,52 @@ impl ZmpReference {
         previous.1
     }
 
-    /// Tick by tick from now on, without end.
-    pub fn samples(&self) -> impl Iterator<Item = Vector2<f64>> + '_ {
-        (0..).map(|tick| self.at(tick))
+    /// The same as it is seen so many ticks later.
+    pub fn later(mut self, ticks: i64) -> Self {
+        for (tick, _) in self.knots.iter_mut().skip(1) {
+            *tick = tick.saturating_sub(ticks);
+        }
+        self
     }
+
+    /// Every point through a map that keeps lines straight and shares on them.
+    pub fn mapped(mut self, affine: impl Fn(&Vector2<f64>) -> Vector2<f64>) -> Self {
+        for (_, point) in self.knots.iter_mut().take(self.count) {
+            *point = affine(point);
+        }
+        self
+    }
+
+    /// The reference in the ticks `from..to`, from >= 0, as lines in order of time.
+    pub(super) fn lines(&self, from: i64, to: i64) -> impl Iterator<Item = Line> + '_ {
+        let ends = self.knots().windows(2).map(|pair| Some((pair[0], pair[1])));
+        let mut begin = from;
+        ends.chain([None]).filter_map(move |knots| {
+            let (end, through, slope) = match knots {
+                Some((before, after)) => {
+                    let length = (after.0 - before.0) as f64;
+                    let slope = if length > 0.0 { (after.1 - before.1) / length } else { Vector2::zeros() };
+                    (after.0.min(to), before, slope)
+                }
+                None => (to, (0, self.last()), Vector2::zeros()),
+            };
+            let ticks = begin..end;
+            if ticks.is_empty() {
+                return None;
+            }
+            begin = end;
+            Some(Line { ticks, through, slope })
+        })
+    }
+}
+
+/// What a reference is in some ticks: linear.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Line {
+    /// In which it is.
+    pub ticks: Range<i64>,
+    /// A tick, which may lie outside of them, and the reference there \[m\].
+    pub through: (i64, Vector2<f64>),
+    /// Change in a tick \[m\].
+    pub slope: Vector2<f64>,
 }
