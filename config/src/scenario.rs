@@ -381,6 +381,9 @@ pub struct Placement {
     /// For how long a process that waits gives way to others before it sleeps \[µs\]. With 0 it sleeps at once, and
     /// must be woken each time.
     pub yield_us: u32,
+    /// How long before a tick is due whoever begins it gets up, and gives way to others from then on: a core that
+    /// sleeps is woken up late. With 0 it is woken when the tick is due. By the clock only.
+    pub early_us: u32,
     /// What to do about a right that a service asks for and doesn't have.
     pub rt: MissingRights,
 }
@@ -393,6 +396,7 @@ impl Default for Placement {
             servo_cores: vec![],
             fifo_priority: None,
             yield_us: 20,
+            early_us: 100,
             rt: MissingRights::default(),
         }
     }

@@ -141,13 +141,28 @@ pub struct PhaseTimes {
     pub said_ns: i64,
 }
 
-/// A tick that began late: its place on the machine's monotonic clock.
+/// A tick that began late: its times on the machine's monotonic clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[allow(missing_docs)]
 pub struct LateTick {
+    /// Which.
     pub tick: u64,
+    /// When it was to begin.
     pub due_ns: u64,
+    /// When the bridge had heard, or done without, the commands of the tick before.
+    pub heard_ns: u64,
+    /// When it had stepped the world, and could have begun.
+    pub ready_ns: u64,
+    /// When it began.
     pub began_ns: u64,
+    /// For how long between due and beginning another service was busy with the tick before.
+    pub others_busy_ns: u64,
+}
+
+impl LateTick {
+    /// Whether it was due before the world had been stepped; else the bridge was ready, and woke up late.
+    pub fn is_overrun(&self) -> bool {
+        self.ready_ns > self.due_ns
+    }
 }
 
 impl LatencyFigures {
@@ -223,12 +238,18 @@ impl LatencyFigures {
         self.record(Span::SensorsToCommands, first.stamp_ns, then.heard_ns);
         self.record(Span::Tick, first.stamp_ns, then.stamp_ns);
         self.record(Span::WakeUp, first.due_ns, first.stamp_ns);
-        let is_late = first.due_ns > 0
-            && first.stamp_ns.saturating_sub(first.due_ns) as f64 > LATE * self.period_ns
+        let is_late = then.due_ns > 0
+            && then.stamp_ns.saturating_sub(then.due_ns) as f64 > LATE * self.period_ns
             && self.late.len() < MAX_LATE_TICKS;
         if is_late {
-            let (due_ns, began_ns) = (first.due_ns, first.stamp_ns);
-            self.late.push(LateTick { tick: tick.tick(), due_ns, began_ns });
+            self.late.push(LateTick {
+                tick: next.tick(),
+                due_ns: then.due_ns,
+                heard_ns: then.heard_ns,
+                ready_ns: then.kept_ns,
+                began_ns: then.stamp_ns,
+                others_busy_ns: busy_ns(tick, then.due_ns, then.stamp_ns),
+            });
         }
         self.keep_if_bad(tick, &first, &then);
     }
@@ -300,6 +321,21 @@ fn of_tick<P: Payload>(tick: &Observation, frame: &Frame<P>) -> Option<Envelope>
 fn last_stamp<P: Payload>(tick: &Observation, frames: &[Frame<P>]) -> u64 {
     let stamps = frames.iter().map(|frame| of_tick(tick, frame).map(|envelope| envelope.stamp_ns));
     stamps.collect::<Option<Vec<_>>>().and_then(|stamps| stamps.into_iter().max()).unwrap_or_default()
+}
+
+/// For how long between these times some service but the bridge was at work on this tick.
+fn busy_ns(tick: &Observation, from_ns: u64, to_ns: u64) -> u64 {
+    let envelope = |frame: &Envelope| (frame.heard_ns.max(from_ns), frame.stamp_ns.min(to_ns));
+    let states = tick.robot_state.iter().map(|frame| envelope(&frame.envelope));
+    let commands = tick.joint_command.iter().map(|frame| envelope(&frame.envelope));
+    let mut times: Vec<_> = states.chain(commands).chain([envelope(&tick.team_state.envelope)]).collect();
+    times.sort_unstable();
+    let mut until_ns = from_ns;
+    times.into_iter().fold(0, |busy_ns, (begin_ns, end_ns)| {
+        let new_ns = end_ns.saturating_sub(begin_ns.max(until_ns));
+        until_ns = until_ns.max(end_ns);
+        busy_ns + new_ns
+    })
 }
 
 fn phases_of(tick: &Observation, then: &Envelope) -> Vec<PhaseTimes> {
@@ -408,8 +444,16 @@ mod tests {
             tick(number, begin(number) + late_ns, begin(number))
         });
         let figures = gathered(ticks);
-        let expected = LateTick { tick: 40, due_ns: begin(40), began_ns: begin(40) + 700_000 };
+        let expected = LateTick {
+            tick: 40,
+            due_ns: begin(40),
+            heard_ns: begin(40),
+            ready_ns: begin(40) + 600_000,
+            began_ns: begin(40) + 700_000,
+            others_busy_ns: 0,
+        };
         assert_eq!(figures.late(), [expected]);
+        assert!(expected.is_overrun());
         let worst = &figures.worst()[0];
         assert_eq!((figures.worst().len(), worst.at_ns), (WORST_TICKS, begin(worst.tick) + 20_000));
         assert_eq!(worst.tick, 39, "the next one's commands came late");
@@ -419,6 +463,17 @@ mod tests {
             (Some(0), 52_000, 92_000, 93_000)
         );
         assert!((median_us(&figures, Span::WakeUp).expect("a clock") - 20.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn what_others_do_while_a_tick_is_due_is_counted_once() {
+        let busy = tick(7, 1_000_000, 0);
+        // States take from 1 to 34 µs, the coordinator from 39 to 45, commands from 52 to 93.
+        let of = |from_ns, to_ns| busy_ns(&busy, 1_000_000 + from_ns, 1_000_000 + to_ns);
+        assert_eq!(of(0, 200_000), 33_000 + 6_000 + 41_000);
+        assert_eq!(of(10_000, 20_000), 10_000);
+        assert_eq!(of(42_000, 60_000), 3_000 + 8_000);
+        assert_eq!(of(100_000, 200_000), 0);
     }
 
     #[test]

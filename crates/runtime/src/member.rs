@@ -2,7 +2,7 @@
 
 use crate::allocations::allocations;
 use crate::board::{Board, BoardError, Role, Slot, State};
-use crate::pace::{Pace, now_ns, sleep_until};
+use crate::pace::{Pace, now_ns, sleep_until, yield_until};
 use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::wait::{Reason, Sleeper, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
@@ -328,7 +328,8 @@ impl Member {
                 if now_ns > start_ns.saturating_add(pace.period_ns) {
                     self.board.set_origin_ns(origin_ns.saturating_add(now_ns - start_ns));
                 } else {
-                    sleep_until(start_ns);
+                    sleep_until(start_ns.saturating_sub(self.policy.up_early.as_nanos() as u64));
+                    yield_until(start_ns);
                 }
                 start_ns
             }

@@ -22,6 +22,13 @@ pub fn sleep_until(due_ns: u64) {
     }
 }
 
+/// Gives way to others until this time.
+pub(crate) fn yield_until(due_ns: u64) {
+    while now_ns() < due_ns {
+        rustix::thread::sched_yield();
+    }
+}
+
 /// When the phases of one service are due.
 #[derive(Clone, Debug)]
 pub(crate) struct Pace {

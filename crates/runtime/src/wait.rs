@@ -12,6 +12,9 @@ pub struct WaitPolicy {
     /// How long it gives way to others before it sleeps. While it does, it notices its input within a
     /// microsecond; a sleeper has to be woken, which costs the waker a system call and takes longer.
     pub yield_for: Duration,
+    /// How long before a tick is due it stops sleeping: a core that is asleep itself takes tens of microseconds
+    /// to wake up, and now and then hundreds.
+    pub up_early: Duration,
 }
 
 impl Default for WaitPolicy {
@@ -20,7 +23,7 @@ impl Default for WaitPolicy {
     /// the cores, longer yielding costs milliseconds at a time, since one that yields goes to the end of
     /// the queue, and one that is woken does not.
     fn default() -> Self {
-        Self { yield_for: Duration::from_micros(20) }
+        Self { yield_for: Duration::from_micros(20), up_early: Duration::from_micros(100) }
     }
 }
 

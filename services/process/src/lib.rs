@@ -112,7 +112,10 @@ fn try_serve<P: Replaceable>(
     let schedule = tick_schedule(&run).map_err(ServeError::configuration)?;
     let service = service(&run)?;
     let placement = &run.scenario.placement;
-    let policy = WaitPolicy { yield_for: Duration::from_micros(placement.yield_us.into()) };
+    let policy = WaitPolicy {
+        yield_for: Duration::from_micros(placement.yield_us.into()),
+        up_early: Duration::from_micros(placement.early_us.into()),
+    };
     let core = schedule.phases_of(service).find_map(|phase| phase.core);
     let real_time = RealTime {
         core,

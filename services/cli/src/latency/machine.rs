@@ -97,17 +97,22 @@ fn watch_core(core: usize, fifo_priority: Option<u8>, is_over: &AtomicBool) -> C
     }
 }
 
-/// Whether a tick was late since a core stood still; none if the watch could not tell, as it had to queue as well.
+/// Whether a tick was late since a core stood still, or since its bridge, that was ready, was not woken up while no
+/// other service had anything to do either; none if nobody can tell, as all had to queue behind others.
 pub fn is_the_machines(late: &LateTick, cores: &[CoreLateness]) -> Option<bool> {
     if cores.iter().any(|core| !core.is_above_services) {
         return None;
+    }
+    let late_ns = late.began_ns.saturating_sub(late.due_ns);
+    let is_much = |ns: u64| ns as f64 >= MACHINES_SHARE * late_ns as f64;
+    if !late.is_overrun() && is_much(late_ns.saturating_sub(late.others_busy_ns)) {
+        return Some(true);
     }
     let overlap_ns = |&(from_ns, to_ns): &(u64, u64)| {
         to_ns.min(late.began_ns).saturating_sub(from_ns.max(late.due_ns - late.due_ns.min(PERIOD_NS)))
     };
     let longest_ns = cores.iter().map(|core| core.stalls.iter().map(overlap_ns).sum::<u64>()).max();
-    let late_ns = late.began_ns.saturating_sub(late.due_ns);
-    Some(longest_ns.unwrap_or_default() as f64 >= MACHINES_SHARE * late_ns as f64)
+    Some(is_much(longest_ns.unwrap_or_default()))
 }
 
 /// Sees what an idle machine does for so long.
@@ -134,9 +139,24 @@ mod tests {
         }
     }
 
+    /// Due at 50 ms, begun at 54 ms.
+    fn late(ready_ns: u64, others_busy_ns: u64) -> LateTick {
+        let (due_ns, began_ns) = (50_000_000, 54_000_000);
+        LateTick { tick: 7, due_ns, heard_ns: 49_000_000, ready_ns, began_ns, others_busy_ns }
+    }
+
+    #[test]
+    fn a_tick_is_the_machines_if_nobody_else_was_busy_while_its_bridge_was_not_woken_up() {
+        let told = |late: &LateTick| is_the_machines(late, &[core(&[], true)]);
+        assert_eq!(told(&late(49_900_000, 1_900_000)), Some(true));
+        assert_eq!(told(&late(49_900_000, 2_100_000)), Some(false));
+        assert_eq!(told(&late(53_900_000, 0)), Some(false));
+        assert_eq!(is_the_machines(&late(49_900_000, 0), &[core(&[], false)]), None);
+    }
+
     #[test]
     fn a_tick_is_the_machines_if_a_core_stood_still_for_half_of_its_delay() {
-        let late = LateTick { tick: 7, due_ns: 50_000_000, began_ns: 54_000_000 };
+        let late = late(53_900_000, 0);
         let told = |stalls: &[(u64, u64)]| is_the_machines(&late, &[core(&[], true), core(stalls, true)]);
         assert_eq!(told(&[(50_100_000, 53_900_000)]), Some(true));
         assert_eq!(told(&[(49_500_000, 52_000_000)]), Some(true));

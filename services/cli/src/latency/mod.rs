@@ -86,6 +86,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
         ticks: figures.ticks(),
         spans: figures.spans(),
         late: lateness(&figures, &machine),
+        late_ticks: figures.late().to_vec(),
         // Services that compute nothing don't say what they heard.
         ticks_held: if arguments.empty { 0 } else { summary.timing.ticks_held },
         frames_lost: summary.timing.frames_lost,

@@ -2,7 +2,7 @@
 
 use super::machine::CoreLateness;
 use crate::table;
-use mikoshi_observation::{SpanSummary, WorstTick};
+use mikoshi_observation::{LateTick, SpanSummary, WorstTick};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -26,6 +26,9 @@ pub struct LatencyResult {
     pub ticks: u64,
     pub spans: Vec<SpanSummary>,
     pub late: Lateness,
+    /// All of them.
+    #[serde(default)]
+    pub late_ticks: Vec<LateTick>,
     /// Ticks in which the world moved on without a robot's command.
     pub ticks_held: u64,
     /// Frames that the measurement missed.
