@@ -88,7 +88,7 @@ impl<'a> Ours<'a> {
     fn poses_of_links(&mut self, index: usize) {
         self.poses(index);
         for &frame in &self.walk.links {
-            black_box(self.kinematics.frame_pose::<Base>(&self.walk.robot.model, frame));
+            black_box(&self.kinematics.frame_pose::<Base>(&self.walk.robot.model, frame));
         }
     }
 

@@ -47,7 +47,8 @@ impl Walk {
     /// Of this robot.
     pub fn of(recording: &Recording, robot: usize) -> Self {
         let spec = &recording.run.robots[robot];
-        let body = Robot::new(&spec.config, &spec.urdf).and_then(|body| body.with_hands(&spec.grasping_hands));
+        let body =
+            Robot::new(&spec.config, &spec.urdf).and_then(|body| body.with_hands(&spec.grasping_hands));
         let body = body.expect("it was run");
         let ik = body.whole_body_ik(recording.run.scenario.control_period_s).expect("it was run");
         let n = body.model.joint_count();
@@ -62,14 +63,17 @@ impl Walk {
             }
         };
         let postures: Vec<_> = recording.walking().map(posture).collect();
-        let commands: Vec<_> =
-            recording.walking().map(|tick| tick.joint_command[robot].payload.joint_position_ref_rad).collect();
+        let commands: Vec<_> = recording
+            .walking()
+            .map(|tick| tick.joint_command[robot].payload.joint_position_ref_rad)
+            .collect();
         let (mut kinematics, mut scratch) = (Kinematics::new(&body.model), IkScratch::new(&body.model));
         let steps = commands.windows(2).zip(&postures).filter_map(|(commands, posture)| {
             let state = IkState::at_rest(&commands[0][..n]);
             kinematics.update(&body.model, &posture.base, &commands[1][..n]);
             let targets = targets(&body, &kinematics);
-            let report = ik.solve(&body.model, &mut state.clone(), &mut scratch, &targets).expect("it is finite");
+            let report =
+                ik.solve(&body.model, &mut state.clone(), &mut scratch, &targets).expect("it is finite");
             let is_free = report.at_position_limit | report.at_velocity_limit == 0;
             is_free.then_some(Step { state, targets })
         });

@@ -64,7 +64,10 @@ impl Recording {
 /// Leaves the log of a walk.
 pub fn walk(results: &Results) {
     let mut command = mikoshi();
-    command.args(["run", "--quiet", "--in-process", "--out"]).arg(results.path()).arg(of_project("transport"));
+    command
+        .args(["run", "--quiet", "--in-process", "--out"])
+        .arg(results.path())
+        .arg(of_project("transport"));
     for value in OVERRIDES {
         command.args(["--set", value]);
     }
