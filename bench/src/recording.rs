@@ -35,7 +35,7 @@ impl Recording {
     /// Lets four robots walk, in one thread, as `mikoshi run --in-process` does, and reads the log that they leave.
     pub fn of_walking() -> Self {
         let results = Results::new();
-        walk(&results);
+        walk(&results, &[]);
         Self::read(&results.log())
     }
 
@@ -61,9 +61,10 @@ impl Recording {
     }
 }
 
-/// Leaves the log of a walk.
-pub fn walk(results: &Results) {
+/// Leaves the log of a walk, with these variables in the environment.
+pub fn walk(results: &Results, environment: &[(&str, &str)]) {
     let mut command = mikoshi();
+    command.envs(environment.iter().copied());
     command
         .args(["run", "--quiet", "--in-process", "--out"])
         .arg(results.path())
