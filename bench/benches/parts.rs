@@ -7,6 +7,7 @@ use mikoshi_bench::postures::Walk;
 use mikoshi_bench::recording::Recording;
 use mikoshi_bench::table::{print_comparisons, print_times};
 use mikoshi_bench::{beside_pinocchio, bridge, parts, recorder};
+use mikoshi_tests::programs;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -56,7 +57,7 @@ fn main() {
         "recorder": log,
         "beside_pinocchio": beside,
     });
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/parts.json");
+    let path = programs::folder().with_file_name("parts.json");
     let text = serde_json::to_string_pretty(&all).expect("numbers and names");
     fs::write(&path, text + "\n").unwrap_or_else(|error| panic!("{}: {error}", path.display()));
 }

@@ -11,7 +11,7 @@ use mikoshi_humanoid::balance::{
 use mikoshi_humanoid::estimate::{BaseEstimator, BaseEstimatorGains, FootContact, Readings};
 use mikoshi_humanoid::gait::{GaitConfig, GaitInputs, GroundPose, StepClock, TeamClock};
 use mikoshi_humanoid::{IkScratch, Kinematics};
-use mikoshi_spatial::Wrench;
+use mikoshi_spatial::{Twist, Wrench};
 use nalgebra::{Vector2, Vector3};
 use std::hint::black_box;
 
@@ -63,6 +63,7 @@ pub fn of_a_servo(walk: &Walk) -> Vec<Row> {
         ("kinematics", kinematics(walk)),
         ("Jacobians against the stance foot, centre of mass", jacobians(walk)),
         ("inverse kinematics", inverse_kinematics(walk)),
+        ("inverse kinematics, hands out of reach", out_of_reach(walk)),
         ("gait with preview", gait()),
         ("stabiliser", stabiliser()),
     ]
@@ -134,6 +135,25 @@ fn inverse_kinematics(walk: &Walk) -> Spread {
         for step in walk.steps.iter().cycle().skip(first % walk.steps.len()).take(count) {
             let mut state = step.state;
             black_box(walk.ik.solve(&walk.robot.model, &mut state, &mut scratch, &step.targets))
+                .expect("it is finite");
+        }
+    })
+}
+
+/// The worst that references do: both hands at speed limits, on the way to where they can't go.
+fn out_of_reach(walk: &Walk) -> Spread {
+    let mut scratch = IkScratch::new(&walk.robot.model);
+    let first = &walk.steps[0];
+    let mut state = first.state;
+    measure(&mut |first_call, count| {
+        for call in first_call..first_call + count {
+            let side = if call % 400 < 200 { 1.0 } else { -1.0 };
+            let mut targets = first.targets;
+            for hand in targets.hands.iter_mut().flatten() {
+                let way = Vector3::new(0.5 * side, -0.3 * side, 0.2);
+                *hand = hand.displaced(&Twist::new(way, Vector3::zeros()));
+            }
+            black_box(walk.ik.solve(&walk.robot.model, &mut state, &mut scratch, &targets))
                 .expect("it is finite");
         }
     })

@@ -165,8 +165,10 @@ impl Count {
 
 fn compiler() -> String {
     let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let output = Command::new(rustc).arg("--version").output().expect("the compiler is there");
-    String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    let said = Command::new(rustc).arg("--version").output();
+    said.map_or("a compiler that is not here".to_owned(), |output| {
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    })
 }
 
 fn file() -> PathBuf {

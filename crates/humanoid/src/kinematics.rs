@@ -4,7 +4,7 @@
 //! velocity of the root link, both in world axes, then the joint velocities. Every Jacobian maps ν to a
 //! velocity in world axes, linear before angular (the paper's eq. 1).
 
-use crate::model::{FrameId, Joint, JointKind, Model};
+use crate::model::{Frame, FrameId, Joint, JointKind, Model};
 use mikoshi_spatial::{Base, CoordinateFrame, Pose, Twist, World, skew};
 use nalgebra::{Matrix3, Matrix3xX, Matrix6xX, Rotation3, UnitQuaternion, Vector3, Vector6};
 
@@ -144,8 +144,7 @@ impl Kinematics {
     pub fn frame_pose<F: CoordinateFrame>(&self, model: &Model, frame: FrameId) -> Pose<World, F> {
         let position = self.frame_position(model, frame);
         let frame = model.frame(frame);
-        let rotation = quaternion(&self.bodies[frame.body].rotation) * frame.pose.rotation;
-        Pose::new(position, rotation)
+        Pose::new(position, attitude(&self.bodies[frame.body].rotation, frame))
     }
 
     /// Centre of mass in the world \[m\].
@@ -279,12 +278,13 @@ impl Model {
         let body = joints_of(self.path(frame.body)).fold(root, |pose, j| pose.moved_by(self, j, q[j]).0);
         Pose::new(
             body.position + body.rotation * frame.pose.translation.vector,
-            quaternion(&body.rotation) * frame.pose.rotation,
+            attitude(&body.rotation, frame),
         )
     }
 }
 
-/// Of a matrix that is a rotation by construction.
-fn quaternion(rotation: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation))
+/// Of a frame on a body whose rotation this is: a matrix that is a rotation by construction.
+fn attitude(body: &Matrix3<f64>, frame: &Frame) -> UnitQuaternion<f64> {
+    let body = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*body));
+    if frame.is_turned { body * frame.pose.rotation } else { body }
 }

@@ -111,6 +111,8 @@ pub struct Frame {
     pub body: usize,
     /// Its pose in that body.
     pub pose: Isometry3<f64>,
+    /// Whether its axes are others than the body's.
+    pub(crate) is_turned: bool,
     /// Mass distribution of this link alone, in its own frame.
     pub inertial: Inertial,
 }

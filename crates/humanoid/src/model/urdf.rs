@@ -225,7 +225,8 @@ impl Builder<'_> {
         }
         let merged = &mut self.bodies[body].inertial;
         *merged = merged.combined(&inertial.transformed(&pose));
-        self.frames.push(Frame { name: link.name.clone(), parent, body, pose, inertial });
+        let is_turned = pose.rotation != UnitQuaternion::identity();
+        self.frames.push(Frame { name: link.name.clone(), parent, body, pose, is_turned, inertial });
         Ok(id)
     }
 
