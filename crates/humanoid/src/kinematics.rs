@@ -32,10 +32,13 @@ struct BodyPose {
 
 impl BodyPose {
     /// The body that a joint moves, from the one it hangs on.
-    #[inline]
+    #[inline(always)] // in the loop over all joints a call with its copies takes half as long again
     fn moved_by(&self, model: &Model, joint: usize, q: f64) -> (Self, Vector3<f64>) {
         let joint = &model.joints()[joint];
-        let R_WJ = joint.origin_rotation.map_or(self.rotation, |rotation| self.rotation * rotation);
+        let R_WJ = match &joint.origin_rotation {
+            Some(rotation) => self.rotation * rotation,
+            None => self.rotation,
+        };
         let p_WJ = self.position + self.rotation * joint.origin.translation.vector;
         let axis_W = match joint.along {
             Some(along) => R_WJ.column(along).into_owned(),
@@ -50,7 +53,7 @@ impl BodyPose {
 }
 
 /// R, and then a rotation about the joint's axis.
-#[inline]
+#[inline(always)] // as above
 fn turned(R: &Matrix3<f64>, joint: &Joint, angle_rad: f64) -> Matrix3<f64> {
     let (sin, cos) = angle_rad.sin_cos();
     let Some(along) = joint.along else { return R * rotation_about(&joint.axis, sin, cos) };
@@ -240,6 +243,7 @@ impl Kinematics {
     }
 
     /// What one unit of joint j's velocity does to a point of a body beyond it.
+    #[inline]
     fn column(&self, model: &Model, j: usize, point: &Vector3<f64>) -> Vector6<f64> {
         let linear = self.linear_column(model, j, point);
         let angular = match model.joints()[j].kind {
@@ -250,6 +254,7 @@ impl Kinematics {
     }
 
     /// Its linear half.
+    #[inline]
     fn linear_column(&self, model: &Model, j: usize, point: &Vector3<f64>) -> Vector3<f64> {
         match model.joints()[j].kind {
             JointKind::Revolute => self.axes[j].cross(&(point - self.bodies[j + 1].position)),
@@ -258,6 +263,7 @@ impl Kinematics {
     }
 
     /// What one unit of joint j's velocity does to the centre of mass.
+    #[inline]
     fn com_column(&self, model: &Model, j: usize) -> Vector3<f64> {
         let axis = &self.axes[j];
         let mass = model.subtree_mass_kg(j + 1);
