@@ -4,10 +4,10 @@
 CARGO ?= cargo
 RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench lint
+.PHONY: help setup build demo test bench bench-parts lint
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-7s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: ## Fetch MuJoCo's library (once) into .mujoco/run-make-setup
 	@command -v $(CARGO) >/dev/null || { echo "make: cargo is missing: see https://rustup.rs" >&2; exit 1; }
@@ -25,6 +25,10 @@ test: build ## Run every test
 
 bench: setup ## Run the benchmarks
 	$(CARGO) bench --workspace
+
+bench-parts: build ## Time the parts of a tick, kinematics beside Pinocchio's (which is fetched from PyPI, once)
+	@scripts/setup-pinocchio
+	MIKOSHI_PINOCCHIO="$(abspath $(or $(CARGO_TARGET_DIR),target))/pinocchio" $(CARGO) bench --workspace --bench parts
 
 lint: setup ## Formatting, clippy, and dependency rules where cargo-deny is installed
 	$(CARGO) fmt --all --check

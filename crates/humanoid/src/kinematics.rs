@@ -4,7 +4,7 @@
 //! velocity of the root link, both in world axes, then the joint velocities. Every Jacobian maps ν to a
 //! velocity in world axes, linear before angular (the paper's eq. 1).
 
-use crate::model::{FrameId, JointKind, Model};
+use crate::model::{Frame, FrameId, Joint, JointKind, Model};
 use mikoshi_spatial::{Base, CoordinateFrame, Pose, Twist, World, skew};
 use nalgebra::{Matrix3, Matrix3xX, Matrix6xX, Rotation3, UnitQuaternion, Vector3, Vector6};
 
@@ -32,22 +32,44 @@ struct BodyPose {
 
 impl BodyPose {
     /// The body that a joint moves, from the one it hangs on.
+    #[inline(always)] // in the loop over all joints a call with its copies takes half as long again
     fn moved_by(&self, model: &Model, joint: usize, q: f64) -> (Self, Vector3<f64>) {
         let joint = &model.joints()[joint];
-        let R_WJ = self.rotation * joint.origin_rotation;
+        let R_WJ = match &joint.origin_rotation {
+            Some(rotation) => self.rotation * rotation,
+            None => self.rotation,
+        };
         let p_WJ = self.position + self.rotation * joint.origin.translation.vector;
-        let axis_W = R_WJ * joint.axis.into_inner();
+        let axis_W = match joint.along {
+            Some(along) => R_WJ.column(along).into_owned(),
+            None => R_WJ * joint.axis.into_inner(),
+        };
         let pose = match joint.kind {
-            JointKind::Revolute => Self { rotation: R_WJ * rotation_about(&joint.axis, q), position: p_WJ },
+            JointKind::Revolute => Self { rotation: turned(&R_WJ, joint, q), position: p_WJ },
             JointKind::Prismatic => Self { rotation: R_WJ, position: p_WJ + axis_W * q },
         };
         (pose, axis_W)
     }
 }
 
-/// Rodrigues' formula: R = cos θ I + sin θ [a]× + (1 − cos θ) a aᵀ.
-fn rotation_about(axis: &Vector3<f64>, angle_rad: f64) -> Matrix3<f64> {
+/// R, and then a rotation about the joint's axis.
+#[inline(always)] // as above
+fn turned(R: &Matrix3<f64>, joint: &Joint, angle_rad: f64) -> Matrix3<f64> {
     let (sin, cos) = angle_rad.sin_cos();
+    let Some(along) = joint.along else { return R * rotation_about(&joint.axis, sin, cos) };
+    // Of a rotation about a coordinate axis most entries are zero. One rounds as Rodrigues' formula does, so that
+    // the result does not depend on how an axis is written.
+    let (x, y, z) = (R.column(0), R.column(1), R.column(2));
+    let one = cos + (1.0 - cos);
+    match along {
+        0 => Matrix3::from_columns(&[x * one, y * cos + z * sin, y * -sin + z * cos]),
+        1 => Matrix3::from_columns(&[x * cos + z * -sin, y * one, x * sin + z * cos]),
+        _ => Matrix3::from_columns(&[x * cos + y * sin, x * -sin + y * cos, z * one]),
+    }
+}
+
+/// Rodrigues' formula: R = cos θ I + sin θ [a]× + (1 − cos θ) a aᵀ.
+fn rotation_about(axis: &Vector3<f64>, sin: f64, cos: f64) -> Matrix3<f64> {
     let a = axis * (1.0 - cos);
     let s = axis * sin;
     Matrix3::new(
@@ -125,8 +147,7 @@ impl Kinematics {
     pub fn frame_pose<F: CoordinateFrame>(&self, model: &Model, frame: FrameId) -> Pose<World, F> {
         let position = self.frame_position(model, frame);
         let frame = model.frame(frame);
-        let rotation = quaternion(&self.bodies[frame.body].rotation) * frame.pose.rotation;
-        Pose::new(position, rotation)
+        Pose::new(position, attitude(&self.bodies[frame.body].rotation, frame))
     }
 
     /// Centre of mass in the world \[m\].
@@ -139,7 +160,7 @@ impl Kinematics {
     pub fn frame_jacobian(&self, model: &Model, frame: FrameId, jacobian: &mut Matrix6xX<f64>) {
         let p_WF = self.frame_position(model, frame);
         let path = model.path(model.frame(frame).body);
-        jacobian.fill(0.0);
+        jacobian.as_mut_slice().fill(0.0);
         jacobian.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
         jacobian.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
         jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&(p_WF - self.bodies[0].position)));
@@ -157,42 +178,40 @@ impl Kinematics {
         }
     }
 
-    /// Jacobian of a frame's origin over the joints alone, 6 × n, while `stance` stays where it is:
-    /// J_q − J_b J_sb⁻¹ J_sq, with J and J_s the Jacobians of the frame and of the stance frame, and b,
-    /// q their parts for base and joints.
+    /// Columns that are not zero of a frame's Jacobian over the joints alone while `stance` stays where it is, in
+    /// ascending order of the joints: J_q − J_b J_sb⁻¹ J_sq, with J and J_s the Jacobians of the frame and of the
+    /// stance frame, and b, q their parts for base and joints. World axes, linear before angular.
     ///
     /// With a rigid base that product needs no inverse: a joint between the frame and the root moves
     /// the frame; one between the stance and the root moves all the rest the opposite way; one on both
     /// paths moves neither against the other.
-    pub fn stance_jacobian(
-        &self,
-        model: &Model,
+    pub fn stance_columns<'a>(
+        &'a self,
+        model: &'a Model,
         frame: FrameId,
         stance: FrameId,
-        jacobian: &mut Matrix6xX<f64>,
-    ) {
+    ) -> impl Iterator<Item = (usize, Vector6<f64>)> + 'a {
         let p_WF = self.frame_position(model, frame);
         let frame_path = model.path(model.frame(frame).body);
         let stance_path = model.path(model.frame(stance).body);
-        jacobian.fill(0.0);
-        for j in joints_of(frame_path & !stance_path) {
-            jacobian.set_column(j, &self.column(model, j, &p_WF));
-        }
-        for j in joints_of(stance_path & !frame_path) {
-            jacobian.set_column(j, &-self.column(model, j, &p_WF));
-        }
+        joints_of(frame_path ^ stance_path).map(move |j| {
+            let column = self.column(model, j, &p_WF);
+            (j, if frame_path >> j & 1 == 1 { column } else { -column })
+        })
     }
 
-    /// Jacobian of the centre of mass over the joints alone, 3 × n, while `stance` stays where it is.
-    pub fn stance_com_jacobian(&self, model: &Model, stance: FrameId, jacobian: &mut Matrix3xX<f64>) {
+    /// Columns of the Jacobian of the centre of mass over the joints alone while `stance` stays where it is, one for
+    /// each joint.
+    pub fn stance_com_columns<'a>(
+        &'a self,
+        model: &'a Model,
+        stance: FrameId,
+    ) -> impl Iterator<Item = Vector3<f64>> + 'a {
         let stance_path = model.path(model.frame(stance).body);
-        for j in 0..model.joint_count() {
-            jacobian.set_column(j, &self.com_column(model, j));
-        }
-        for j in joints_of(stance_path) {
-            let column = self.com_column(model, j) - self.column(model, j, &self.com).fixed_rows::<3>(0);
-            jacobian.set_column(j, &column);
-        }
+        (0..model.joint_count()).map(move |j| {
+            let column = self.com_column(model, j);
+            if stance_path >> j & 1 == 1 { column - self.linear_column(model, j, &self.com) } else { column }
+        })
     }
 
     /// Twist of a frame's origin in world axes, for the base's twist (of the root link's origin, world
@@ -224,16 +243,27 @@ impl Kinematics {
     }
 
     /// What one unit of joint j's velocity does to a point of a body beyond it.
+    #[inline]
     fn column(&self, model: &Model, j: usize, point: &Vector3<f64>) -> Vector6<f64> {
-        let axis = &self.axes[j];
-        let (linear, angular) = match model.joints()[j].kind {
-            JointKind::Revolute => (axis.cross(&(point - self.bodies[j + 1].position)), *axis),
-            JointKind::Prismatic => (*axis, Vector3::zeros()),
+        let linear = self.linear_column(model, j, point);
+        let angular = match model.joints()[j].kind {
+            JointKind::Revolute => self.axes[j],
+            JointKind::Prismatic => Vector3::zeros(),
         };
         Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
     }
 
+    /// Its linear half.
+    #[inline]
+    fn linear_column(&self, model: &Model, j: usize, point: &Vector3<f64>) -> Vector3<f64> {
+        match model.joints()[j].kind {
+            JointKind::Revolute => self.axes[j].cross(&(point - self.bodies[j + 1].position)),
+            JointKind::Prismatic => self.axes[j],
+        }
+    }
+
     /// What one unit of joint j's velocity does to the centre of mass.
+    #[inline]
     fn com_column(&self, model: &Model, j: usize) -> Vector3<f64> {
         let axis = &self.axes[j];
         let mass = model.subtree_mass_kg(j + 1);
@@ -254,12 +284,13 @@ impl Model {
         let body = joints_of(self.path(frame.body)).fold(root, |pose, j| pose.moved_by(self, j, q[j]).0);
         Pose::new(
             body.position + body.rotation * frame.pose.translation.vector,
-            quaternion(&body.rotation) * frame.pose.rotation,
+            attitude(&body.rotation, frame),
         )
     }
 }
 
-/// Of a matrix that is a rotation by construction.
-fn quaternion(rotation: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation))
+/// Of a frame on a body whose rotation this is: a matrix that is a rotation by construction.
+fn attitude(body: &Matrix3<f64>, frame: &Frame) -> UnitQuaternion<f64> {
+    let body = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*body));
+    if frame.is_turned { body * frame.pose.rotation } else { body }
 }

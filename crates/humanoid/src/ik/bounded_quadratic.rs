@@ -122,8 +122,11 @@ impl BoundedQuadratic {
         }
         let free = &self.free[..m];
         for (column, &j) in free.iter().enumerate() {
-            for (row, &i) in free.iter().enumerate().skip(column) {
-                self.factor[(row, column)] = self.hessian[(i, j)];
+            let (from, to) = (j * n..(j + 1) * n, column * n..column * n + m);
+            let from = &self.hessian.as_slice()[from];
+            let to = &mut self.factor.as_mut_slice()[to];
+            for (value, &i) in to[column..].iter_mut().zip(&free[column..]) {
+                *value = from[i];
             }
             let at_bounds: f64 = joints_of(fixed).map(|k| self.entry(j, k) * self.solution[k]).sum();
             self.candidate[column] = self.linear[j] - at_bounds;
@@ -191,27 +194,19 @@ fn mask(n: usize) -> u64 {
 fn cholesky_solve(a: &mut [f64], stride: usize, b: &mut [f64]) -> Result<(), SolveQuadraticError> {
     let m = b.len();
     for k in 0..m {
-        let (left, right) = a.split_at_mut((k + 1) * stride);
-        let column = &mut left[k * stride..k * stride + m];
-        let pivot = column[k];
+        let (left, right) = a.split_at_mut(k * stride);
+        let column = &mut right[k..m];
+        subtract_outer_products(left, stride, k, column);
+        let pivot = column[0];
         // Written so that NaN fails as well.
         if !(pivot > 0.0 && pivot < f64::INFINITY) {
             return Err(SolveQuadraticError);
         }
         let scale = 1.0 / pivot.sqrt();
-        column[k..].iter_mut().for_each(|value| *value *= scale);
-        for j in k + 1..m {
-            let factor = column[j];
-            if factor != 0.0 {
-                let target = &mut right[(j - k - 1) * stride + j..(j - k - 1) * stride + m];
-                for (value, l) in target.iter_mut().zip(&column[j..]) {
-                    *value -= factor * l;
-                }
-            }
-        }
-        let solved = b[k] / column[k];
+        column.iter_mut().for_each(|value| *value *= scale);
+        let solved = b[k] / column[0];
         b[k] = solved;
-        for (value, l) in b[k + 1..].iter_mut().zip(&column[k + 1..]) {
+        for (value, l) in b[k + 1..].iter_mut().zip(&column[1..]) {
             *value -= solved * l;
         }
     }
@@ -221,6 +216,28 @@ fn cholesky_solve(a: &mut [f64], stride: usize, b: &mut [f64]) -> Result<(), Sol
         b[k] = (b[k] - known) / column[k];
     }
     Ok(())
+}
+
+/// Subtracts from the entries of column k, from the diagonal down, what the columns to its left make of them, one
+/// column after the other: four at a time, so that an entry is fetched and put back a quarter as often.
+fn subtract_outer_products(left: &[f64], stride: usize, k: usize, column: &mut [f64]) {
+    let mut fours = left.chunks_exact(4 * stride);
+    let size = column.len();
+    for four in fours.by_ref() {
+        let part = |index: usize| &four[index * stride + k..index * stride + k + size];
+        let (l0, l1, l2, l3) = (part(0), part(1), part(2), part(3));
+        let (f0, f1, f2, f3) = (l0[0], l1[0], l2[0], l3[0]);
+        for ((((value, l0), l1), l2), l3) in column.iter_mut().zip(l0).zip(l1).zip(l2).zip(l3) {
+            *value = *value - f0 * l0 - f1 * l1 - f2 * l2 - f3 * l3;
+        }
+    }
+    for one in fours.remainder().chunks_exact(stride) {
+        let l = &one[k..k + size];
+        let factor = l[0];
+        for (value, l) in column.iter_mut().zip(l) {
+            *value -= factor * l;
+        }
+    }
 }
 
 #[cfg(test)]

@@ -12,16 +12,18 @@
 //!   keep every small error of linearization.
 
 mod bounded_quadratic;
+mod rows;
 mod settle;
 
 pub use settle::SettlePostureError;
 
 use crate::balance::{PerFoot, Side};
-use crate::kinematics::{Kinematics, joints_of};
+use crate::kinematics::Kinematics;
 use crate::model::{FrameId, MAX_HANDS, MAX_JOINTS, Model};
 use bounded_quadratic::{ActiveSet, BoundedQuadratic};
 use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, log};
-use nalgebra::{Matrix3xX, Matrix6xX, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3};
+use rows::TaskRows;
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 use thiserror::Error;
@@ -243,8 +245,7 @@ pub struct WholeBodyIk {
 pub struct IkScratch {
     /// Of the commanded state; after [`WholeBodyIk::solve`] that of the tick's end.
     pub kinematics: Kinematics,
-    jacobian: Matrix6xX<f64>,
-    com_jacobian: Matrix3xX<f64>,
+    rows: TaskRows,
     program: BoundedQuadratic,
 }
 
@@ -253,8 +254,7 @@ impl IkScratch {
     pub fn new(model: &Model) -> Self {
         Self {
             kinematics: Kinematics::new(model),
-            jacobian: Matrix6xX::zeros(model.joint_count()),
-            com_jacobian: Matrix3xX::zeros(model.joint_count()),
+            rows: TaskRows::default(),
             program: BoundedQuadratic::new(model.joint_count()),
         }
     }
@@ -262,16 +262,13 @@ impl IkScratch {
     /// Overwrites the workspace with NaN, for tests that nothing survives from tick to tick.
     pub fn fill_with_nan(&mut self) {
         self.kinematics.fill_with_nan();
-        self.jacobian.fill(f64::NAN);
-        self.com_jacobian.fill(f64::NAN);
+        self.rows.fill_with_nan();
         self.program.fill_with_nan();
     }
 }
 
 /// One block of rows of eq. 41.
 struct Task {
-    /// Joints with a part in it.
-    joints: u64,
     /// What is missing, linear before angular.
     error: Twist<World>,
     /// What was missing after the last tick.
@@ -390,13 +387,13 @@ impl WholeBodyIk {
 
     /// Normal equations of all tasks, damping and posture.
     fn pose_tasks(&self, model: &Model, state: &IkState, scratch: &mut IkScratch, targets: &IkTargets) {
-        let IkScratch { kinematics, jacobian, com_jacobian, program } = scratch;
+        let IkScratch { kinematics, rows, program } = scratch;
         let (config, gains, residual) = (&self.config, &self.config.gains, &state.residual);
         let stance = config.feet[targets.stance];
-        let stance_path = model.path(model.frame(stance).body);
-        let moving = |frame: FrameId| model.path(model.frame(frame).body) ^ stance_path;
 
-        program.hessian.fill(0.0);
+        for (j, mut column) in program.hessian.column_iter_mut().enumerate() {
+            column.as_mut_slice()[j..].fill(0.0);
+        }
         program.linear = [0.0; MAX_JOINTS];
         let damping = gains.damping * gains.damping;
         for (j, joint) in model.joints().iter().enumerate() {
@@ -409,14 +406,11 @@ impl WholeBodyIk {
             program.linear[j] = damping * posture_step;
         }
 
-        kinematics.stance_com_jacobian(model, stance, com_jacobian);
-        jacobian.fill(0.0);
-        jacobian.fixed_rows_mut::<3>(0).copy_from(com_jacobian);
+        rows.pose_linear(kinematics.stance_com_columns(model, stance));
         self.add_task(
             program,
-            jacobian,
+            rows,
             &Task {
-                joints: all_joints(model),
                 error: Twist::new(targets.com - kinematics.com(), Vector3::zeros()),
                 residual: residual.com,
                 weight: [gains.balance_weight, 0.0],
@@ -424,12 +418,11 @@ impl WholeBodyIk {
         );
 
         let waist: Pose<World, Base> = kinematics.frame_pose(model, config.waist);
-        kinematics.stance_jacobian(model, config.waist, stance, jacobian);
+        rows.pose(kinematics.stance_columns(model, config.waist, stance));
         self.add_task(
             program,
-            jacobian,
+            rows,
             &Task {
-                joints: moving(config.waist),
                 error: Twist::new(Vector3::zeros(), attitude_error(&waist.rotation, &targets.waist_attitude)),
                 residual: residual.waist,
                 weight: [0.0, gains.balance_weight],
@@ -438,12 +431,11 @@ impl WholeBodyIk {
 
         let swing = targets.stance.opposite();
         let foot: Pose<World, Foot> = kinematics.frame_pose(model, config.feet[swing]);
-        kinematics.stance_jacobian(model, config.feet[swing], stance, jacobian);
+        rows.pose(kinematics.stance_columns(model, config.feet[swing], stance));
         self.add_task(
             program,
-            jacobian,
+            rows,
             &Task {
-                joints: moving(config.feet[swing]),
                 error: foot.displacement_to(&targets.feet[swing]),
                 residual: residual.foot,
                 weight: [gains.foot_weight; 2],
@@ -453,16 +445,11 @@ impl WholeBodyIk {
         for ((&frame, target), &residual) in config.hands.iter().zip(&targets.hands).zip(&residual.hands) {
             let Some(target) = target else { continue };
             let hand: Pose<World, Hand> = kinematics.frame_pose(model, frame);
-            kinematics.stance_jacobian(model, frame, stance, jacobian);
+            rows.pose(kinematics.stance_columns(model, frame, stance));
             self.add_task(
                 program,
-                jacobian,
-                &Task {
-                    joints: moving(frame),
-                    error: hand.displacement_to(target),
-                    residual,
-                    weight: [gains.hand_weight; 2],
-                },
+                rows,
+                &Task { error: hand.displacement_to(target), residual, weight: [gains.hand_weight; 2] },
             );
         }
     }
@@ -475,25 +462,15 @@ impl WholeBodyIk {
     /// overshoot and chatter; damping of that size prevents it (compare Sugihara, "Solvability-
     /// unconcerned inverse kinematics by the Levenberg-Marquardt method", 2011). A residual that this
     /// tick can undo adds nothing, so what is followed is followed without lag.
-    fn add_task(&self, program: &mut BoundedQuadratic, jacobian: &Matrix6xX<f64>, task: &Task) {
-        let [w_linear, w_angular] = task.weight;
-        let weight = Vector6::new(w_linear, w_linear, w_linear, w_angular, w_angular, w_angular);
+    fn add_task(&self, program: &mut BoundedQuadratic, rows: &mut TaskRows, task: &Task) {
         let gains = &self.config.gains;
         let error = Twist::<World>::new(
             shortened(task.error.linear, gains.step_m),
             shortened(task.error.angular, gains.step_rad),
-        )
-        .to_vector();
-        for a in joints_of(task.joints) {
-            let column = jacobian.column(a);
-            let weighted = column.component_mul(&weight);
-            program.linear[a] += weighted.dot(&error);
-            for b in joints_of(task.joints & (u64::MAX >> (63 - a))) {
-                program.hessian[(a, b)] += weighted.dot(&jacobian.column(b));
-            }
-            let lever = [column.fixed_rows::<3>(0).norm(), column.fixed_rows::<3>(3).norm()];
-            program.hessian[(a, a)] +=
-                2.0 * (w_linear * task.residual[0] * lever[0] + w_angular * task.residual[1] * lever[1]);
+        );
+        rows.add_to(program, task.weight, &error.to_vector().into());
+        if task.residual != [0.0; 2] {
+            rows.add_damping(program, [0, 1].map(|half| 2.0 * (task.weight[half] * task.residual[half])));
         }
     }
 
@@ -580,10 +557,6 @@ fn shortened(vector: Vector3<f64>, longest: f64) -> Vector3<f64> {
 pub fn joint_margin(model: &Model, joint_position: &[f64]) -> f64 {
     let margins = model.joints().iter().zip(joint_position);
     margins.map(|(joint, q)| (q - joint.lower).min(joint.upper - q)).fold(f64::INFINITY, f64::min)
-}
-
-fn all_joints(model: &Model) -> u64 {
-    (0..model.joint_count()).fold(0, |set, j| set | 1 << j)
 }
 
 /// The joints that move exactly one hand, and no foot.

@@ -75,10 +75,12 @@ pub struct Joint {
     pub parent_body: usize,
     /// Its frame at zero in the parent body; the moved body's frame coincides with it there.
     pub origin: Isometry3<f64>,
-    /// Rotation of `origin`, as a matrix.
-    pub(crate) origin_rotation: Matrix3<f64>,
+    /// Rotation of `origin`, as a matrix; `None` if it is none.
+    pub(crate) origin_rotation: Option<Matrix3<f64>>,
     /// Its axis in its own frame.
     pub axis: UnitVector3<f64>,
+    /// The axis of its own frame that its axis is, if it is one: 0, 1, 2 for x, y, z.
+    pub(crate) along: Option<usize>,
     /// Lower position limit \[rad or m\]; −∞ for continuous joints.
     pub lower: f64,
     /// Upper position limit \[rad or m\]; ∞ for continuous joints.
@@ -109,6 +111,8 @@ pub struct Frame {
     pub body: usize,
     /// Its pose in that body.
     pub pose: Isometry3<f64>,
+    /// Whether its axes are others than the body's.
+    pub(crate) is_turned: bool,
     /// Mass distribution of this link alone, in its own frame.
     pub inertial: Inertial,
 }

@@ -172,13 +172,16 @@ impl Builder<'_> {
             }
         };
         let (lower, upper) = check_limits(joint, is_bounded)?;
+        let rotation = origin.rotation.to_rotation_matrix().into_inner();
+        let axis = check_axis(joint)?;
         self.joints.push(Joint {
             name: joint.name.clone(),
             kind,
             parent_body,
             origin,
-            origin_rotation: origin.rotation.to_rotation_matrix().into_inner(),
-            axis: check_axis(joint)?,
+            origin_rotation: (rotation != Matrix3::identity()).then_some(rotation),
+            axis,
+            along: (0..3).find(|&along| axis[along] == 1.0),
             lower,
             upper,
             velocity: joint.limit.velocity,
@@ -222,7 +225,8 @@ impl Builder<'_> {
         }
         let merged = &mut self.bodies[body].inertial;
         *merged = merged.combined(&inertial.transformed(&pose));
-        self.frames.push(Frame { name: link.name.clone(), parent, body, pose, inertial });
+        let is_turned = pose.rotation != UnitQuaternion::identity();
+        self.frames.push(Frame { name: link.name.clone(), parent, body, pose, is_turned, inertial });
         Ok(id)
     }
 
