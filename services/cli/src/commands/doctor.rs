@@ -17,6 +17,8 @@ const SHARED_MEMORY: &str = "/dev/shm";
 const USUAL_TEAM: usize = 4;
 /// Memory that a process in real time wants to lock.
 const LOCKED_BYTES: u64 = 256 << 20;
+/// Services that yield take up to this much of a core; with less they would stand still in the rest.
+const REAL_TIME_SHARE: f64 = 0.9;
 /// Fewer cores than this run a team of four slower than they could.
 const CORES: usize = 2;
 
@@ -33,6 +35,8 @@ pub fn doctor(arguments: &DoctorArguments) -> Result<Status, Failure> {
         check_cores(),
         check_fifo_priority(),
         check_locked_memory(),
+        check_real_time_share(),
+        check_frequency(),
     ];
     if arguments.json {
         let mut text = serde_json::to_string_pretty(&checks).map_err(Failure::fault)?;
@@ -211,6 +215,40 @@ fn check_fifo_priority() -> Check {
         "add `@realtime - rtprio 80` to /etc/security/limits.conf and this user to the group realtime, or \
          LimitRTPRIO=80 to the systemd unit",
     )
+}
+
+/// The kernel takes cores away from who has a FIFO priority for the rest of each period.
+fn check_real_time_share() -> Check {
+    const NAME: &str = "real-time share";
+    let number = |name: &str| -> Option<f64> {
+        fs::read_to_string(format!("/proc/sys/kernel/{name}")).ok()?.trim().parse().ok()
+    };
+    match (number("sched_rt_runtime_us"), number("sched_rt_period_us")) {
+        (Some(runtime), _) if runtime < 0.0 => Check::fit(NAME, "not limited"),
+        (Some(runtime), Some(period)) if period > 0.0 => {
+            let found = format!("{:.0} % of every {:.1} s", 100.0 * runtime / period, 1e-6 * period);
+            if runtime / period >= REAL_TIME_SHARE {
+                return Check::fit(NAME, found);
+            }
+            let fix = "sysctl kernel.sched_rt_runtime_us=950000, or -1 on cores that nothing else needs";
+            Check::advice(NAME, found, fix)
+        }
+        _ => Check::fit(NAME, "this kernel has no limit"),
+    }
+}
+
+/// Cores that save power are slow when they are wanted.
+fn check_frequency() -> Check {
+    const NAME: &str = "frequency";
+    match fs::read_to_string("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") {
+        Ok(governor) if governor.trim() != "performance" => Check::advice(
+            NAME,
+            format!("cores follow the governor `{}`; runs in real time want the highest", governor.trim()),
+            "cpupower frequency-set --governor performance",
+        ),
+        Ok(_) => Check::fit(NAME, "the highest"),
+        Err(_) => Check::fit(NAME, "not this system's to choose"),
+    }
 }
 
 fn check_locked_memory() -> Check {
