@@ -17,7 +17,7 @@ const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().f
 #[derive(Debug, Args)]
 pub struct Measurement {
     /// Rounds: in each of them every carrier runs once under every wait
-    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u64).range(1..))]
     rounds: u64,
     /// Ticks of a round
     #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(10..))]

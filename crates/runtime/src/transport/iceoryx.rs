@@ -3,12 +3,14 @@
 //! Data travels in iceoryx2's shared memory; waiting and waking happen on the run's board, since a
 //! publisher that finds nobody asleep then makes no system call.
 
+mod calls;
+
 use super::accept::{Verdict, judge};
 use super::{
     ConnectError, Loan, OBSERVER_DEPTH, Observer, OperatorPort, Publisher, Subscriber, Tap, Transport,
     consumer_depth,
 };
-use crate::board::{Doorbell, Role, Slot, State};
+use crate::board::{Doorbell, Role, State};
 use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
 use crate::member::{Member, TAP_LEAD_TICKS};
 use crate::pace::{Pace, now_ns};
@@ -16,6 +18,7 @@ use crate::shared_memory::populate;
 use crate::{
     Clock, Domain, DomainError, Phase, Position, Replaceable, Session, TickError, TickSchedule, Topic,
 };
+use calls::{Awaited, Source, is_gathering};
 use core::cell::{Cell, RefCell};
 use core::mem::MaybeUninit;
 use iceoryx2::port::LoanError;
@@ -109,42 +112,6 @@ pub(super) struct Process {
     run: PathBuf,
     domain: Domain,
     ports: Ports,
-}
-
-/// Whether a phase waits for several publishers.
-fn is_gathering(phase: &Phase) -> bool {
-    phase.inputs.windows(2).any(|pair| pair[0].from != pair[1].from)
-}
-
-/// Where on the board a topic's publisher says that it has sent a frame.
-#[derive(Clone, Copy, Debug)]
-struct Source {
-    slot: usize,
-    /// Of the publisher.
-    phase: usize,
-    /// Among all outputs of the publisher.
-    place: usize,
-}
-
-/// What a service waits for.
-struct Awaited {
-    /// Frames of the publisher's phase that services wait for.
-    frames: usize,
-    /// Whether there are some that only observers see.
-    others_follow: bool,
-    /// Who waits for more than this publisher.
-    gatherings: Vec<Gathering>,
-}
-
-/// A phase that waits for several publishers. Its service is woken when the last frame is there: it would only sleep
-/// again. By the clock it is woken by each, since it goes on without those that don't come.
-struct Gathering {
-    /// The service's slot.
-    slot: usize,
-    /// How old a frame of this topic it uses.
-    age_ticks: u64,
-    /// All that it waits for, and how old.
-    inputs: Vec<(Source, u64)>,
 }
 
 /// All ports of a process, to be connected before the first tick and whenever a process has taken another
@@ -242,79 +209,6 @@ impl Process {
         let port = Rc::new(port);
         self.ports.0.borrow_mut().push(Rc::clone(&port) as Rc<dyn UpdateConnections>);
         port
-    }
-
-    fn source_of(&self, topic: Topic) -> Option<Source> {
-        let schedule = &self.schedule;
-        Some(Source {
-            slot: self.slot_of(Role::Service(schedule.producer_of(topic)?))?,
-            phase: schedule.phase_of(topic)?,
-            place: schedule.place_among_outputs(topic)?,
-        })
-    }
-
-    fn slot_at(&self, source: Source) -> Option<&Slot> {
-        self.member.board().slots().get(source.slot)
-    }
-
-    /// Says that a frame was sent. Those who sleep for what a phase says are woken by one call, after the last frame
-    /// that a service waits for: each call is a system call, and the next ones would hold up those already awake.
-    /// What only observers see can wait until those had their turn.
-    fn say(&self, source: Source, tick: u64, awaited: Option<&Awaited>) {
-        let Some(slot) = self.slot_at(source) else { return };
-        slot.bell(source.place).ring_for(tick);
-        self.unsaid.set(Some(source));
-        if let Some(awaited) = awaited {
-            for gathering in &awaited.gatherings {
-                self.call_if_complete(gathering, tick);
-            }
-            self.sent.set(self.sent.get() + 1);
-            if self.sent.get() >= awaited.frames {
-                self.call_sleepers();
-                if awaited.others_follow {
-                    rustix::thread::sched_yield();
-                }
-            }
-        }
-    }
-
-    fn call_if_complete(&self, gathering: &Gathering, tick: u64) {
-        let is_there = |(source, age_ticks): &(Source, u64)| {
-            let tick = (tick + gathering.age_ticks).checked_sub(*age_ticks);
-            let slot = self.slot_at(*source);
-            tick.zip(slot).is_none_or(|(tick, slot)| slot.bell(source.place).has_rung_for(tick))
-        };
-        if gathering.inputs.iter().all(is_there)
-            && let Some(slot) = self.member.board().slots().get(gathering.slot)
-        {
-            slot.bed.call();
-        }
-    }
-
-    /// The phases that wait for this topic and for other publishers.
-    fn gatherings_of(&self, topic: Topic) -> Vec<Gathering> {
-        let gathering = |phase: &Phase| {
-            let age_ticks = phase.inputs.iter().find(|input| input.topic == topic)?.age_ticks;
-            let slot = self.slot_of(Role::Service(phase.service)).filter(|_| is_gathering(phase))?;
-            let inputs = match self.schedule.clock() {
-                Clock::Lockstep => phase.inputs.as_slice(),
-                Clock::Wall { .. } => &[],
-            };
-            let inputs =
-                inputs.iter().filter_map(|input| Some((self.source_of(input.topic)?, input.age_ticks)));
-            Some(Gathering { slot, age_ticks, inputs: inputs.collect() })
-        };
-        self.schedule.phases().iter().filter_map(gathering).collect()
-    }
-
-    /// Wakes those who sleep for what was sent, if they have not been.
-    fn call_sleepers(&self) {
-        self.sent.set(0);
-        if let Some(source) = self.unsaid.take()
-            && let Some(slot) = self.slot_at(source)
-        {
-            slot.lobby(source.phase).call();
-        }
     }
 
     fn slot_of(&self, role: Role) -> Option<usize> {
@@ -473,13 +367,7 @@ impl Transport for IceoryxTransport {
         let schedule = &process.schedule;
         let source = process.source_of(topic).filter(|_| schedule.producer_of(topic) == Some(service));
         let source = source.ok_or(ConnectError::NotAnOutput { service, topic })?;
-        let is_awaited = |topic: Topic| schedule.consumers_of(topic).next().is_some();
-        let of_phase = schedule.phases_of(service).nth(source.phase).map(|phase| phase.outputs.as_slice());
-        let of_phase = of_phase.unwrap_or_default();
-        let frames = of_phase.iter().filter(|output| is_awaited(output.topic)).count();
-        let others_follow = frames < of_phase.len();
-        let gatherings = process.gatherings_of(topic);
-        let awaited = is_awaited(topic).then_some(Awaited { frames, others_follow, gatherings });
+        let awaited = process.awaited(topic, source);
         let frames = frames_of_publisher(schedule, topic);
         let port = process
             .service::<P>(topic)?
