@@ -2,9 +2,14 @@
 # suffice. One build profile serves everything, so a clean checkout compiles its dependencies once.
 
 CARGO ?= cargo
-RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+RELEASE := $(TARGET)/release
+# A workspace of its own, which shares what has been built.
+PEERS := --release --manifest-path bench/peers/Cargo.toml --target-dir $(TARGET)
+COMMA := ,
+DDS = $(shell pkg-config --exists CycloneDDS && command -v idlc)
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench bench-parts lint
+.PHONY: help setup build demo test bench bench-parts peers lint
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -22,16 +27,23 @@ demo: build ## Four robots walk and carry one object
 
 test: build ## Run every test
 	$(CARGO) test --release --workspace
+	$(CARGO) test $(PEERS)
 
 bench: setup ## Run the benchmarks
 	$(CARGO) bench --workspace
 
 bench-parts: build ## Time the parts of a tick, kinematics beside Pinocchio's (which is fetched from PyPI, once)
 	@scripts/setup-pinocchio
-	MIKOSHI_PINOCCHIO="$(abspath $(or $(CARGO_TARGET_DIR),target))/pinocchio" $(CARGO) bench --workspace --bench parts
+	MIKOSHI_PINOCCHIO="$(abspath $(TARGET))/pinocchio" $(CARGO) bench --workspace --bench parts
+
+peers: ## Compare the exchange of frames with raw memory, iceoryx2, sockets, Zenoh, CycloneDDS
+	$(if $(DDS),,@echo "peers: CycloneDDS is left out, since cyclonedds-dev, cyclonedds-tools or pkg-config is missing")
+	$(CARGO) run $(PEERS) --features zenoh$(if $(DDS),$(COMMA)dds) -- compare --json $(TARGET)/peers.json
 
 lint: setup ## Formatting, clippy, and dependency rules where cargo-deny is installed
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
+	$(CARGO) fmt --manifest-path bench/peers/Cargo.toml --check
+	$(CARGO) clippy $(PEERS) --all-targets -- -D warnings
 	@if $(CARGO) deny --version >/dev/null 2>&1; then $(CARGO) deny --all-features check; \
 	else echo "lint: cargo-deny is not installed, dependency rules are not checked"; fi

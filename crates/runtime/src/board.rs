@@ -168,9 +168,11 @@ pub(crate) struct Slot {
     /// The board's generation whose processes it is connected to.
     welcomed: AtomicU32,
     progress: Progress,
+    /// Where its owner sleeps for what is not a frame, and whoever will be in charge, or was.
     pub(crate) bed: Bed,
-    /// Where one waits who will be in charge, or was.
-    pub(crate) porch: Bed,
+    /// By phase: where others sleep until its owner has said what they wait for.
+    lobbies: [Bed; LOBBIES],
+    bells: [Bell; BELLS],
     message: [AtomicU64; MESSAGE_WORDS],
 }
 
@@ -180,6 +182,66 @@ struct Progress {
     position: AtomicU64,
     /// How often its owner has asked for memory, where it counts that.
     allocations: AtomicU64,
+}
+
+/// Changes whenever a frame of one topic has been sent. On a cache line of its own: its receiver looks at it all the
+/// time.
+#[repr(C, align(64))]
+pub(crate) struct Bell {
+    rung: AtomicU64,
+    /// One past the latest tick that it was rung for.
+    next_tick: AtomicU64,
+}
+
+impl Bell {
+    /// Says that there may be something.
+    fn ring(&self) {
+        self.rung.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// Says that the frame of this tick has been sent. Sequentially consistent, as [`Bed::call`] wants it.
+    pub(crate) fn ring_for(&self, tick: u64) {
+        self.next_tick.fetch_max(tick.saturating_add(1), Ordering::SeqCst);
+        self.ring();
+    }
+
+    /// Whether the frame of this tick has been sent. Of several who ask after they have rung, one sees all.
+    pub(crate) fn has_rung_for(&self, tick: u64) -> bool {
+        self.next_tick.load(Ordering::SeqCst) > tick
+    }
+}
+
+/// Phases of a service that have a lobby of their own; any more share the last one.
+const LOBBIES: usize = 2;
+
+/// Topics of a service that have a bell of their own; any more share the last one.
+const BELLS: usize = 2 * MAX_ROBOTS + 1;
+
+/// Hears whether something may have been sent since nothing was found: looking into a queue costs more.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Doorbell {
+    /// How the bell stood before the look that found nothing.
+    heard: Option<u64>,
+}
+
+impl Doorbell {
+    /// What `look` finds, if there may be something.
+    pub(crate) fn answer<T, E>(
+        &mut self,
+        bell: &Bell,
+        look: impl FnOnce() -> Result<Option<T>, E>,
+    ) -> Result<Option<T>, E> {
+        // Before the look: what comes during it is for the next.
+        let rung = Some(bell.rung.load(Ordering::Acquire));
+        if self.heard == rung {
+            return Ok(None);
+        }
+        let found = look()?;
+        if found.is_none() {
+            self.heard = rung;
+        }
+        Ok(found)
+    }
 }
 
 /// Who speaks for a service.
@@ -219,6 +281,21 @@ impl Slot {
 
     pub(crate) fn set_allocations(&self, allocations: u64) {
         self.progress.allocations.store(allocations, Ordering::Relaxed);
+    }
+
+    /// The bell of what the schedule lists at this place among its owner's outputs.
+    pub(crate) fn bell(&self, index: usize) -> &Bell {
+        &self.bells[index.min(BELLS - 1)]
+    }
+
+    /// Where those sleep who wait for what its owner says in this phase.
+    pub(crate) fn lobby(&self, phase: usize) -> &Bed {
+        &self.lobbies[phase.min(LOBBIES - 1)]
+    }
+
+    /// Rings for everything that its owner may have sent.
+    pub(crate) fn ring_all(&self) {
+        self.bells.iter().for_each(Bell::ring);
     }
 
     pub(crate) fn process(&self) -> Option<ProcessIdentity> {
@@ -285,7 +362,7 @@ impl Slot {
     /// Asks whoever has the slot to make room at the next tick.
     pub(crate) fn ask_to_retire(&self) {
         self.retirement.store(1, Ordering::Release);
-        self.bed.wake_anyway();
+        self.bed.call_after_fence();
     }
 
     /// Says that it is connected to all processes of this generation.
@@ -361,7 +438,7 @@ struct Header {
 }
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi7");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi8");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -575,8 +652,8 @@ impl Board {
 
     pub(crate) fn wake_all(&self) {
         for slot in self.slots() {
-            slot.bed.wake_anyway();
-            slot.porch.wake_anyway();
+            slot.bed.call_whoever_sleeps();
+            slot.lobbies.iter().for_each(Bed::call_whoever_sleeps);
         }
     }
 
@@ -618,6 +695,31 @@ mod tests {
 
     fn own() -> ProcessIdentity {
         ProcessIdentity::own().expect("/proc is there")
+    }
+
+    #[test]
+    fn a_queue_is_looked_into_only_if_the_bell_was_rung_since_nothing_was_found() {
+        let bell = Bell { rung: AtomicU64::new(0), next_tick: AtomicU64::new(0) };
+        let mut doorbell = Doorbell::default();
+        let mut look = |found: Option<u8>| {
+            let mut looked = false;
+            let answer = doorbell.answer(&bell, || {
+                looked = true;
+                Ok::<_, ()>(found)
+            });
+            (looked, answer)
+        };
+        assert_eq!(look(None), (true, Ok(None)), "what was before anybody listened");
+        assert_eq!(look(Some(1)), (false, Ok(None)));
+        bell.ring_for(7);
+        assert_eq!(look(Some(1)), (true, Ok(Some(1))));
+        assert_eq!(look(Some(2)), (true, Ok(Some(2))), "there may be more");
+        assert_eq!(look(None), (true, Ok(None)));
+        assert_eq!(look(Some(3)), (false, Ok(None)));
+        bell.ring();
+        assert_eq!(look(Some(3)), (true, Ok(Some(3))));
+        bell.ring_for(5);
+        assert_eq!([5, 7, 8].map(|tick| bell.has_rung_for(tick)), [true, true, false]);
     }
 
     #[test]

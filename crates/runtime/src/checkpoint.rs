@@ -88,7 +88,7 @@ impl CheckpointWriter {
             .ok_or(TickError::Checkpoint("the file is too short"))?;
         // No sequence, no checkpoint: it must be gone before anything of the slot changes.
         store(line, 0, 0);
-        fence(Ordering::SeqCst);
+        fence(Ordering::Release);
         let length = save(state)?;
         let state = state.get(..length).ok_or(TickError::Checkpoint("the state is larger than it said"))?;
         let checksum = xxh3_64(state);
@@ -96,7 +96,7 @@ impl CheckpointWriter {
         for (index, value) in [(1, position.to_word()), (2, length as u64), (3, checksum)] {
             store(line, index, value);
         }
-        fence(Ordering::SeqCst);
+        fence(Ordering::Release);
         store(line, 0, self.count);
         Ok(())
     }

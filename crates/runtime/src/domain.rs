@@ -65,7 +65,10 @@ impl Domain {
     }
 
     /// iceoryx2's configuration.
-    pub(crate) fn config(&self) -> Result<Config, DomainError> {
+    ///
+    /// # Errors
+    /// [`DomainError::UnusablePath`].
+    pub fn config(&self) -> Result<Config, DomainError> {
         let unusable = || DomainError::UnusablePath(self.root.clone());
         let root = IceoryxPath::new(self.root.as_os_str().as_bytes()).map_err(|_| unusable())?;
         let mut config = Config::default();

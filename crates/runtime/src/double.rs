@@ -166,8 +166,11 @@ impl<T: Transport> Participant for Double<T> {
         let numbers = &self.numbers;
         match (&mut self.ports, call) {
             (Ports::Bridge { sensors, truth, object, .. }, Call::Publish) => {
-                for ((sensors, truth), value) in sensors.iter_mut().zip(truth).zip(numbers) {
+                // First what others wait for.
+                for (sensors, value) in sensors.iter_mut().zip(numbers) {
                     publish(sensors, tick, |payload| payload.joint_position_rad[0] = *value)?;
+                }
+                for (truth, value) in truth.iter_mut().zip(numbers) {
                     publish(truth, tick, |payload| payload.tilt_rad = *value)?;
                 }
                 publish(object, tick, |payload| payload.pose[0] = numbers.iter().sum())

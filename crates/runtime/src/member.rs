@@ -4,7 +4,7 @@ use crate::allocations::allocations;
 use crate::board::{Board, BoardError, Role, Slot, State};
 use crate::pace::{Pace, now_ns, sleep_until, yield_until};
 use crate::process::{ProcessIdentity, ProcessWatch};
-use crate::wait::{Reason, Sleeper, WaitPolicy, Woken};
+use crate::wait::{Bed, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
 use core::cell::{Cell, RefCell};
 use mikoshi_ipc_types::ServiceId;
@@ -156,7 +156,7 @@ impl Member {
     pub(crate) fn wait_for_welcome(&self) -> Result<(), TickError> {
         let Some(tap) = self.slot_of(Role::Tap).filter(|_| !self.board.is_paced()) else { return Ok(()) };
         let generation = self.charge_generation.get();
-        self.wait_for(Reason::STATE, || {
+        self.wait_for(|| {
             let is_connected = (State::Wired..=State::Running).contains(&tap.state());
             Ok((!is_connected || tap.has_welcomed(generation)).then_some(()))
         })
@@ -172,7 +172,7 @@ impl Member {
         if slot.living_owner().is_some() {
             slot.ask_to_retire();
         }
-        self.wait_at_porch(|| slot.living_owner().is_none())?;
+        self.wait_in_place(|| slot.living_owner().is_none())?;
         Ok(None)
     }
 
@@ -203,8 +203,8 @@ impl Member {
         }
     }
 
-    /// Waits beside the bed that whoever is in charge sleeps in.
-    fn wait_at_porch(&self, is_over: impl Fn() -> bool) -> Result<(), TickError> {
+    /// Waits while it is not in charge.
+    fn wait_in_place(&self, is_over: impl Fn() -> bool) -> Result<(), TickError> {
         self.wait_beside(None, || Ok(is_over().then_some(()))).map(|_| ())
     }
 
@@ -213,8 +213,7 @@ impl Member {
         due_ns: Option<u64>,
         poll: impl Fn() -> Result<Option<()>, TickError>,
     ) -> Result<Option<()>, TickError> {
-        let sleeper = Sleeper { reason: Reason::STATE, epoch: self.epoch() };
-        self.slot().porch.wait(sleeper, self.policy, due_ns, poll, |_| match self.board.stop_is_requested() {
+        self.slot().bed.wait(self.policy, due_ns, poll, |_| match self.board.stop_is_requested() {
             true => Err(TickError::Stopped),
             false => Ok(()),
         })
@@ -228,7 +227,7 @@ impl Member {
     /// on its way.
     pub(crate) fn retire(&self) -> Result<(), TickError> {
         self.enter(State::Retired);
-        self.wait_at_porch(|| !self.is_in_charge())
+        self.wait_in_place(|| !self.is_in_charge())
     }
 
     /// What is to be done, at the latest in its next wait, when a process has taken another one's place.
@@ -294,7 +293,7 @@ impl Member {
     pub(crate) fn meet(&self, state: State) -> Result<(), TickError> {
         self.enter(state);
         let goes_on_without = |index| self.board.is_paced() && self.has_exited(index);
-        self.wait_for(Reason::STATE, || {
+        self.wait_for(|| {
             let mut slots = self.board.slots().iter().enumerate();
             let all_met = slots.all(|(index, slot)| match (slot.role(), slot.state()) {
                 (Some(Role::Service(_)), State::Failed) => self.board.is_paced(),
@@ -311,7 +310,7 @@ impl Member {
     /// Waits while the tap is attached and has consumed less than this many ticks.
     pub(crate) fn wait_for_tap(&self, ticks: u64) -> Result<(), TickError> {
         let Some(tap) = self.slot_of(Role::Tap) else { return Ok(()) };
-        self.wait_for(Reason::CREDIT, || {
+        self.wait_for(|| {
             let attached = (State::Starting..=State::Running).contains(&tap.state());
             Ok((!attached || tap.position().tick >= ticks).then_some(()))
         })
@@ -346,20 +345,19 @@ impl Member {
     /// Those of `poll`; a service or the supervisor is gone; the run is to stop.
     pub(crate) fn wait_for<T>(
         &self,
-        reason: Reason,
         mut poll: impl FnMut() -> Result<Option<T>, TickError>,
     ) -> Result<T, TickError> {
         loop {
-            if let Some(found) = self.wait_until(reason, None, &mut poll)? {
+            if let Some(found) = self.wait_until(&self.slot().bed, None, &mut poll)? {
                 return Ok(found);
             }
         }
     }
 
-    /// As [`Member::wait_for`], but at `due_ns`, if there is such a time, the wait ends with nothing.
+    /// As [`Member::wait_for`], in this bed; at `due_ns`, if there is such a time, the wait ends with nothing.
     pub(crate) fn wait_until<T>(
         &self,
-        reason: Reason,
+        bed: &Bed,
         due_ns: Option<u64>,
         mut poll: impl FnMut() -> Result<Option<T>, TickError>,
     ) -> Result<Option<T>, TickError> {
@@ -367,8 +365,7 @@ impl Member {
             self.welcome_successors();
             poll()
         };
-        let sleeper = Sleeper { reason, epoch: self.epoch() };
-        self.slot().bed.wait(sleeper, self.policy, due_ns, poll, |woken| {
+        bed.wait(self.policy, due_ns, poll, |woken| {
             if !self.is_in_charge() {
                 return Err(TickError::Fenced);
             }
@@ -383,6 +380,8 @@ impl Member {
             && let Some(action) = &*self.on_successor.borrow()
         {
             action();
+            // They were given what was kept for them.
+            self.slot().ring_all();
             self.slot().welcome(generation);
             self.board.wake_all();
         }

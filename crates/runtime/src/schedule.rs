@@ -397,6 +397,12 @@ impl TickSchedule {
         ages.map(|(_, input)| input.age_ticks).max().unwrap_or(0)
     }
 
+    /// Where among all outputs of its publisher this topic is.
+    pub(crate) fn place_among_outputs(&self, topic: Topic) -> Option<usize> {
+        let phases = self.phases_of(self.producer_of(topic)?);
+        phases.flat_map(|phase| &phase.outputs).position(|output| output.topic == topic)
+    }
+
     /// Which of its publisher's phases publishes this topic.
     pub fn phase_of(&self, topic: Topic) -> Option<usize> {
         let publishes = |phase: &Phase| phase.outputs.iter().any(|output| output.topic == topic);

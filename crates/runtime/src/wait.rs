@@ -30,50 +30,26 @@ impl Default for WaitPolicy {
 /// How long a sleeper sleeps before it looks whether those it waits for still live.
 const SLEEP_NS: u64 = 100_000_000;
 
-/// What a process sleeps for, by a number that waker and sleeper agree on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Reason(u16);
-
-impl Reason {
-    /// The state of another slot.
-    pub(crate) const STATE: Self = Self(u16::MAX);
-    /// The tap's progress.
-    pub(crate) const CREDIT: Self = Self(u16::MAX - 1);
-
-    /// The frame that the schedule lists at this place among its outputs.
-    pub(crate) fn output(index: usize) -> Self {
-        Self(index as u16 + 1)
-    }
-}
-
-/// Who sleeps, and what for: a process that lost its place must not be taken for its successor.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Sleeper {
-    pub reason: Reason,
-    /// Its incarnation.
-    pub epoch: u64,
-}
-
-impl Sleeper {
-    fn to_word(self) -> u32 {
-        (self.epoch as u32) << u16::BITS | u32::from(self.reason.0)
-    }
-}
-
-/// Where one process sleeps and others wake it. It lives in shared memory, on a cache line of its own:
-/// in the common case wakers only read it, and find that nobody sleeps.
+/// Where processes sleep until somebody calls. It lives in shared memory, on a cache line of its own: in the common
+/// case callers only read it, and find that nobody sleeps.
+///
+/// Any number may sleep in it, and one call wakes all. Whoever dies or is frozen in it leaves nothing behind but a call
+/// that nobody hears: it is the caller who notes that nobody sleeps any more.
 #[repr(C, align(64))]
 pub(crate) struct Bed {
-    /// Changes when the sleeper is woken: the futex.
+    /// Changes with every call: the futex.
     ticket: AtomicU32,
-    /// The [`Sleeper`]; 0 while it is awake.
-    sleeper: AtomicU32,
+    /// Not 0 if somebody may sleep.
+    is_taken: AtomicU32,
 }
 
 /// Whoever looks at its watch so much too late did not run, and perhaps nobody could.
 const OVERSLEPT_NS: u64 = 500_000;
 /// What is then still waited for.
 const GRACE_NS: u64 = 2_000_000;
+
+/// How often a process gives way before it looks at its watch again.
+const YIELDS_A_LOOK: u32 = 4;
 
 /// Until when something is waited for.
 struct Patience {
@@ -117,12 +93,11 @@ impl Bed {
     /// Polls until it returns something: at first giving way to others, then sleeping in between. After
     /// each sleep `check` may end the wait. At `due_ns`, if there is such a time, it ends with nothing.
     ///
-    /// Nothing is lost: the reason is written before the last poll, and a waker reads it after what it
-    /// wakes for is visible. Both are separated by sequentially consistent fences, so that the sleeper
-    /// sees the event or the waker sees the sleeper.
+    /// Nothing is lost: that somebody sleeps is written before the last poll, and a caller reads it after what it
+    /// calls for is visible. Both are separated by sequential consistency, so that the sleeper sees the event or
+    /// the caller sees the sleeper.
     pub(crate) fn wait<T, E>(
         &self,
-        sleeper: Sleeper,
         policy: WaitPolicy,
         due_ns: Option<u64>,
         mut poll: impl FnMut() -> Result<Option<T>, E>,
@@ -131,31 +106,28 @@ impl Bed {
         if let Some(value) = poll()? {
             return Ok(Some(value));
         }
-        let start_ns = now_ns();
+        // In the common case it is over before anybody has to know what time it is.
+        let start_ns = if due_ns.is_some() || !policy.yield_for.is_zero() { now_ns() } else { 0 };
         let mut patience = Patience::until(due_ns, start_ns);
         let end_ns = start_ns.saturating_add(policy.yield_for.as_nanos() as u64);
         let mut time_ns = start_ns;
         while time_ns < end_ns && !patience.is_over(time_ns) {
-            rustix::thread::sched_yield();
-            if let Some(value) = poll()? {
-                return Ok(Some(value));
+            for _ in 0..YIELDS_A_LOOK {
+                rustix::thread::sched_yield();
+                if let Some(value) = poll()? {
+                    return Ok(Some(value));
+                }
             }
             time_ns = now_ns();
         }
-        let word = sleeper.to_word();
         while !patience.is_over(time_ns) {
-            self.sleeper.store(word, Ordering::Relaxed);
+            let ticket = self.ticket.load(Ordering::Acquire);
+            self.is_taken.store(1, Ordering::Relaxed);
             fence(Ordering::SeqCst);
-            let ticket = self.ticket.load(Ordering::Relaxed);
-            let last_look = poll();
-            let left_ns = patience.left_ns(now_ns()).min(SLEEP_NS);
-            let woken =
-                if matches!(last_look, Ok(None)) { self.sleep(ticket, left_ns) } else { Woken::Called };
-            // By now it may be another one's.
-            let _ = self.sleeper.compare_exchange(word, 0, Ordering::Relaxed, Ordering::Relaxed);
-            if let Some(value) = last_look? {
+            if let Some(value) = poll()? {
                 return Ok(Some(value));
             }
+            let woken = self.sleep(ticket, patience.left_ns(time_ns).min(SLEEP_NS));
             if let Some(value) = poll()? {
                 return Ok(Some(value));
             }
@@ -165,20 +137,24 @@ impl Bed {
         Ok(None)
     }
 
-    /// Wakes the sleeper if it sleeps for this reason. What it is woken for has been written before.
-    pub(crate) fn wake(&self, reason: Reason) {
-        fence(Ordering::SeqCst);
-        if self.sleeper.load(Ordering::Relaxed) as u16 == reason.0 {
-            self.call();
+    /// Wakes all who sleep. What they are woken for has been written before, sequentially consistent with what follows.
+    pub(crate) fn call(&self) {
+        if self.is_taken.load(Ordering::SeqCst) != 0 && self.is_taken.swap(0, Ordering::SeqCst) != 0 {
+            self.call_whoever_sleeps();
         }
     }
 
-    /// Wakes the sleeper, whatever it sleeps for.
-    pub(crate) fn wake_anyway(&self) {
+    /// As [`Bed::call`], for what was written in whatever order.
+    pub(crate) fn call_after_fence(&self) {
         fence(Ordering::SeqCst);
-        if self.sleeper.load(Ordering::Relaxed) != 0 {
-            self.call();
-        }
+        self.call();
+    }
+
+    /// Wakes all who sleep, though a caller may have been killed after it had noted that nobody does.
+    pub(crate) fn call_whoever_sleeps(&self) {
+        self.ticket.fetch_add(1, Ordering::SeqCst);
+        // Fails only for an address that is not mapped, and `self` is.
+        let _ = futex::wake(&self.ticket, futex::Flags::empty(), u32::MAX >> 1);
     }
 
     /// Sleeps unless somebody has called since the ticket was drawn.
@@ -189,12 +165,6 @@ impl Bed {
             _ => Woken::Called,
         }
     }
-
-    fn call(&self) {
-        self.ticket.fetch_add(1, Ordering::Relaxed);
-        // Fails only for an address that is not mapped, and `self` is.
-        let _ = futex::wake(&self.ticket, futex::Flags::empty(), u32::MAX >> 1);
-    }
 }
 
 #[cfg(test)]
@@ -202,6 +172,50 @@ mod tests {
     use super::*;
 
     const MS: u64 = 1_000_000;
+
+    /// Lets so many sleep in one bed, and calls once when they do. Returns what woke each.
+    fn woken_by(sleepers: usize, call: impl FnOnce(&Bed)) -> Vec<Woken> {
+        let bed = Bed { ticket: AtomicU32::new(0), is_taken: AtomicU32::new(0) };
+        let looks = AtomicU32::new(0);
+        let policy = WaitPolicy { yield_for: Duration::ZERO };
+        std::thread::scope(|scope| {
+            let sleeper = || {
+                let poll = || {
+                    looks.fetch_add(1, Ordering::SeqCst);
+                    Ok(None::<()>)
+                };
+                // What woke it ends its wait.
+                bed.wait(policy, None, poll, Err).expect_err("there is nothing")
+            };
+            let threads: Vec<_> = (0..sleepers).map(|_| scope.spawn(sleeper)).collect();
+            // Each looks twice before it sleeps.
+            while looks.load(Ordering::SeqCst) < 2 * sleepers as u32 {
+                std::thread::yield_now();
+            }
+            call(&bed);
+            threads.into_iter().map(|thread| thread.join().expect("it ends")).collect()
+        })
+    }
+
+    #[test]
+    fn one_call_wakes_all_who_sleep() {
+        assert_eq!(woken_by(3, Bed::call_after_fence), [Woken::Called; 3]);
+    }
+
+    #[test]
+    fn a_sleeper_is_called_also_if_a_caller_was_killed_before_it_woke_anybody() {
+        let was_killed = |bed: &Bed| bed.is_taken.store(0, Ordering::SeqCst);
+        let woken = woken_by(1, |bed| {
+            was_killed(bed);
+            bed.call_whoever_sleeps();
+        });
+        assert_eq!(woken, [Woken::Called]);
+        let woken = woken_by(1, |bed| {
+            was_killed(bed);
+            bed.call();
+        });
+        assert_eq!(woken, [Woken::TimedOut], "who sleeps was noted to be awake");
+    }
 
     #[test]
     fn patience_ends_when_it_is_due() {

@@ -3,18 +3,22 @@
 //! Data travels in iceoryx2's shared memory; waiting and waking happen on the run's board, since a
 //! publisher that finds nobody asleep then makes no system call.
 
+mod calls;
+
 use super::accept::{Verdict, judge};
 use super::{
     ConnectError, Loan, OBSERVER_DEPTH, Observer, OperatorPort, Publisher, Subscriber, Tap, Transport,
     consumer_depth,
 };
-use crate::board::{Role, State};
+use crate::board::{Doorbell, Role, State};
 use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
 use crate::member::{Member, TAP_LEAD_TICKS};
 use crate::pace::{Pace, now_ns};
 use crate::shared_memory::populate;
-use crate::wait::Reason;
-use crate::{Clock, Domain, DomainError, Position, Replaceable, Session, TickError, TickSchedule, Topic};
+use crate::{
+    Clock, Domain, DomainError, Phase, Position, Replaceable, Session, TickError, TickSchedule, Topic,
+};
+use calls::{Awaited, Source, is_gathering};
 use core::cell::{Cell, RefCell};
 use core::mem::MaybeUninit;
 use iceoryx2::port::LoanError;
@@ -102,6 +106,9 @@ pub(super) struct Process {
     /// When the last input came, or was given up, and when what came of it was kept.
     heard_ns: Cell<u64>,
     kept_ns: Cell<u64>,
+    /// What was sent since sleepers were called, and how many frames that services wait for.
+    unsaid: Cell<Option<Source>>,
+    sent: Cell<usize>,
     run: PathBuf,
     domain: Domain,
     ports: Ports,
@@ -153,6 +160,8 @@ impl Process {
             due_ns: Cell::new(None),
             heard_ns: Cell::default(),
             kept_ns: Cell::default(),
+            unsaid: Cell::new(None),
+            sent: Cell::default(),
             run,
             domain,
             ports,
@@ -202,10 +211,6 @@ impl Process {
         port
     }
 
-    fn reason_for(&self, topic: Topic) -> Option<Reason> {
-        self.schedule.outputs().position(|(_, output)| output.topic == topic).map(Reason::output)
-    }
-
     fn slot_of(&self, role: Role) -> Option<usize> {
         self.member.board().index_of(role)
     }
@@ -213,6 +218,8 @@ impl Process {
     /// Connects all ports to those that others have.
     pub(super) fn connect(&self) {
         self.ports.connect();
+        // They were given what was kept for them.
+        self.member.slot().ring_all();
     }
 
     /// Meets all others once they have their ports, connects to them, and touches all memory.
@@ -312,6 +319,8 @@ impl Session for IceoryxTransport {
 
     fn begin_phase(&self, at: Position) -> Result<(), TickError> {
         let Process { member, pace, due_ns, .. } = &*self.process;
+        // Observers, who wait for what is said last.
+        self.process.call_sleepers();
         member.begin_phase(at)?;
         let opens_tick = self.opens_tick && at.phase == 0;
         match pace {
@@ -336,6 +345,7 @@ impl Session for IceoryxTransport {
 
     fn finish(&self, outcome: Result<(), TickError>) -> Result<(), TickError> {
         let member = &self.process.member;
+        self.process.call_sleepers();
         // Nobody takes its ports away while others may still read from them. Observers are not waited
         // for: what they are connected to stays until they have read it.
         let met = outcome.and_then(|()| member.meet(State::Done));
@@ -355,10 +365,9 @@ impl Transport for IceoryxTransport {
     fn publisher<P: Payload>(&self, robot: usize) -> Result<IceoryxPublisher<P>, ConnectError> {
         let (topic, service, process) = (Topic::of::<P>(robot), self.service, &self.process);
         let schedule = &process.schedule;
-        let reason = process
-            .reason_for(topic)
-            .filter(|_| schedule.producer_of(topic) == Some(service))
-            .ok_or(ConnectError::NotAnOutput { service, topic })?;
+        let source = process.source_of(topic).filter(|_| schedule.producer_of(topic) == Some(service));
+        let source = source.ok_or(ConnectError::NotAnOutput { service, topic })?;
+        let awaited = process.awaited(topic, source);
         let frames = frames_of_publisher(schedule, topic);
         let port = process
             .service::<P>(topic)?
@@ -368,35 +377,27 @@ impl Transport for IceoryxTransport {
             .override_sample_preallocation(move |_| frames)
             .create()
             .map_err(|error| ConnectError::Failed { topic, reason: error.to_string() })?;
-        let readers = schedule
-            .consumers_of(topic)
-            .map(|(consumer, _)| Role::Service(consumer))
-            .chain([Role::Tap])
-            .filter_map(|role| process.slot_of(role))
-            .collect();
-        Ok(IceoryxPublisher { process: Rc::clone(process), port: process.keep(port), topic, reason, readers })
+        let port = process.keep(port);
+        Ok(IceoryxPublisher { process: Rc::clone(process), port, topic, source, awaited })
     }
 
     fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<IceoryxSubscriber<P>, ConnectError> {
         let (topic, service, process) = (Topic::of::<P>(robot), self.service, &self.process);
         let not_an_input = ConnectError::NotAnInput { service, topic };
-        let Some(input) = process.schedule.input_of(service, topic) else { return Err(not_an_input) };
-        let (Some(reason), Some(from), Some(phase)) = (
-            process.reason_for(topic),
-            process.slot_of(Role::Service(input.from)),
-            process.schedule.phase_of(topic),
-        ) else {
+        let is_input = |phase: &&Phase| phase.inputs.iter().any(|input| input.topic == topic);
+        let Some(phase) = process.schedule.phases_of(service).find(is_input) else {
             return Err(not_an_input);
         };
+        let Some(source) = process.source_of(topic) else { return Err(not_an_input) };
         let depth = consumer_depth(&process.schedule, topic);
         let port = process.subscribe(topic, depth, depth)?;
         Ok(IceoryxSubscriber {
             process: Rc::clone(process),
             port,
             topic,
-            reason,
-            from,
-            phase,
+            source,
+            is_gathering: is_gathering(phase),
+            bell: Doorbell::default(),
             arrived: Box::new(Frame::zeroed()),
             early: None,
         })
@@ -413,8 +414,9 @@ pub struct IceoryxPublisher<P: Payload> {
     process: Rc<Process>,
     port: Rc<IceoryxPort<ipc::Service, Frame<P>, ()>>,
     topic: Topic,
-    reason: Reason,
-    readers: Vec<usize>,
+    source: Source,
+    /// If a service waits for it.
+    awaited: Option<Awaited>,
 }
 
 impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
@@ -459,12 +461,11 @@ impl<P: Payload> Loan<P> for IceoryxLoan<'_, P> {
 
     fn send(mut self) -> Result<(), TickError> {
         let publisher = self.publisher;
-        self.sample.payload_mut().envelope.stamp_ns = now_ns();
+        let envelope = &mut self.sample.payload_mut().envelope;
+        envelope.stamp_ns = now_ns();
+        let tick = envelope.tick;
         self.sample.send().map_err(|_| TickError::TransportFailed { topic: publisher.topic })?;
-        let slots = publisher.process.member.board().slots();
-        for slot in publisher.readers.iter().filter_map(|index| slots.get(*index)) {
-            slot.bed.wake(publisher.reason);
-        }
+        publisher.process.say(publisher.source, tick, publisher.awaited.as_ref());
         Ok(())
     }
 }
@@ -474,11 +475,10 @@ pub struct IceoryxSubscriber<P: Payload> {
     process: Rc<Process>,
     port: Rc<IceoryxSubscriberPort<ipc::Service, Frame<P>, ()>>,
     topic: Topic,
-    reason: Reason,
-    /// The publisher's slot.
-    from: usize,
-    /// The publisher's phase.
-    phase: usize,
+    source: Source,
+    /// Whether it sleeps alone.
+    is_gathering: bool,
+    bell: Doorbell,
     /// Where frames are copied to before they are looked at: shared memory may change under the eyes.
     arrived: Box<Frame<P>>,
     /// The tick of what has arrived, if that came before its time.
@@ -495,24 +495,26 @@ impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
 
 impl<P: Payload> IceoryxSubscriber<P> {
     fn receive_in_time(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
-        let Self { process, port, topic, reason, from, phase, arrived, early } = self;
+        let Self { process, port, topic, source, is_gathering, bell, arrived, early } = self;
         let (topic, due_ns) = (*topic, process.due_ns.get());
         let missing = TickError::InputMissing { topic, tick };
         // By the clock one goes on without what was lost, and uses what follows in its turn.
         if early.is_some_and(|found| found > tick) {
             return Err(missing);
         }
-        let slot = process.member.board().slots().get(*from);
-        let slot = slot.ok_or(TickError::TransportFailed { topic })?;
-        if early.take() == Some(tick) && judge(arrived, topic, *phase, slot.charge(), tick)? == Verdict::Use {
+        let Source { phase, place, .. } = *source;
+        let slot = process.slot_at(*source).ok_or(TickError::TransportFailed { topic })?;
+        if early.take() == Some(tick) && judge(arrived, topic, phase, slot.charge(), tick)? == Verdict::Use {
             *frame = **arrived;
             return Ok(());
         }
-        let found = process.member.wait_until(*reason, due_ns, || {
-            while let Some(sample) = port.receive().map_err(|_| TickError::TransportFailed { topic })? {
+        let bed = if *is_gathering { &process.member.slot().bed } else { slot.lobby(phase) };
+        let found = process.member.wait_until(bed, due_ns, || {
+            let receive = || port.receive().map_err(|_| TickError::TransportFailed { topic });
+            while let Some(sample) = bell.answer(slot.bell(place), receive)? {
                 **arrived = *sample.payload();
                 drop(sample);
-                match judge(arrived, topic, *phase, slot.charge(), tick) {
+                match judge(arrived, topic, phase, slot.charge(), tick) {
                     Ok(Verdict::Use) => return Ok(Some(())),
                     Ok(Verdict::PassOver) => {}
                     Err(TickError::FutureTick { found, .. }) if process.pace.is_some() => {
@@ -586,7 +588,7 @@ impl IceoryxTap {
         let member = &self.process.member;
         member.slot().set_position(Position { tick: ticks, phase: 0 });
         if let Some(slot) = self.opener.and_then(|index| member.board().slots().get(index)) {
-            slot.bed.wake(Reason::CREDIT);
+            slot.bed.call_after_fence();
         }
     }
 
@@ -601,10 +603,11 @@ impl Tap for IceoryxTap {
 
     fn observer<P: Payload>(&self, robot: usize) -> Result<IceoryxObserver<P>, ConnectError> {
         let topic = Topic::of::<P>(robot);
-        let reason = self.process.reason_for(topic).ok_or(ConnectError::NotPublished { topic })?;
+        let process = &self.process;
+        let source = process.source_of(topic).ok_or(ConnectError::NotPublished { topic })?;
         // A tap is there from the first tick: what was before is nothing.
         let port = self.process.subscribe(topic, OBSERVER_DEPTH, 0)?;
-        Ok(IceoryxObserver { process: Rc::clone(&self.process), port, topic, reason })
+        Ok(IceoryxObserver { process: Rc::clone(process), port, topic, source, bell: Doorbell::default() })
     }
 }
 
@@ -613,7 +616,8 @@ pub struct IceoryxObserver<P: Payload> {
     process: Rc<Process>,
     port: Rc<IceoryxSubscriberPort<ipc::Service, Frame<P>, ()>>,
     topic: Topic,
-    reason: Reason,
+    source: Source,
+    bell: Doorbell,
 }
 
 impl<P: Payload> Observer<P> for IceoryxObserver<P> {
@@ -621,7 +625,9 @@ impl<P: Payload> Observer<P> for IceoryxObserver<P> {
         let topic = self.topic;
         // Who only looks now and then has no wait in which to do so.
         self.process.member.welcome_successors();
-        let Some(sample) = self.port.receive().map_err(|_| TickError::TransportFailed { topic })? else {
+        let slot = self.process.slot_at(self.source).ok_or(TickError::TransportFailed { topic })?;
+        let receive = || self.port.receive().map_err(|_| TickError::TransportFailed { topic });
+        let Some(sample) = self.bell.answer(slot.bell(self.source.place), receive)? else {
             return Ok(false);
         };
         *frame = *sample.payload();
@@ -632,12 +638,14 @@ impl<P: Payload> Observer<P> for IceoryxObserver<P> {
     }
 
     fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
-        let process = Rc::clone(&self.process);
-        process.member.wait_for(self.reason, || {
+        let (process, source) = (Rc::clone(&self.process), self.source);
+        let slot = process.slot_at(source).ok_or(TickError::TransportFailed { topic: self.topic })?;
+        let found = process.member.wait_until(slot.lobby(source.phase), None, || {
             // Asked first: what was published before the end is found after it.
             let have_ended = process.member.all_services_have_ended();
             let is_found = self.try_receive(frame)?;
             Ok((is_found || have_ended).then_some(is_found))
-        })
+        })?;
+        Ok(found.unwrap_or(false))
     }
 }

@@ -81,6 +81,11 @@ pub trait Transport {
 pub struct OperatorPort(pub(crate) Box<dyn Fn() -> u64>);
 
 impl OperatorPort {
+    /// Where nobody speaks.
+    pub fn silent() -> Self {
+        Self(Box::new(|| 0))
+    }
+
     /// What the operator has said last: [`TeamState::operator_word`](mikoshi_ipc_types::TeamState).
     pub fn word(&self) -> u64 {
         (self.0)()
