@@ -22,6 +22,7 @@ demo: build ## Four robots walk and carry one object
 
 test: build ## Run every test
 	$(CARGO) test --release --workspace
+	@scripts/test-log-readers
 
 bench: setup ## Run the benchmarks
 	$(CARGO) bench --workspace

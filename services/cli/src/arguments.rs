@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use clap::{Args, Parser, Subcommand};
+use mikoshi_recording::DEFAULT_VIEW_HZ;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
@@ -245,9 +246,20 @@ pub struct ResultsArguments {
     /// No progress and no table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
-    /// Record no frames: run.mcap takes 2.6 MB for each second of four robots
+    /// Record no frames: run.mcap takes 3.6 MB for each second of four robots
     #[arg(long)]
     pub no_log: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub views: ViewArguments,
+}
+
+/// What logs hold beside frames.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ViewArguments {
+    /// How often a second of the run is written down for Foxglove and the like; 0: frames only
+    #[arg(long, value_name = "HZ", default_value_t = DEFAULT_VIEW_HZ, value_parser = rate)]
+    pub view_hz: f64,
 }
 
 /// `mikoshi adopt`.
@@ -274,6 +286,9 @@ pub struct RecordArguments {
     /// Errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub views: ViewArguments,
 }
 
 /// `mikoshi replay`.
@@ -446,6 +461,11 @@ pub struct DoctorArguments {
     /// Remove what dead runs have left
     #[arg(long)]
     pub clean: bool,
+}
+
+fn rate(typed: &str) -> Result<f64, String> {
+    let hz = typed.parse().ok().filter(|hz: &f64| hz.is_finite() && *hz >= 0.0);
+    hz.ok_or_else(|| "expected a rate in Hz, or 0".to_owned())
 }
 
 fn key_and_value(typed: &str) -> Result<(String, String), String> {
