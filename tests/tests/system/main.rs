@@ -12,6 +12,7 @@ mod leader_follower;
 mod lost_grasp;
 mod real_time;
 mod record;
+mod render;
 mod replay;
 mod report;
 mod succession;

@@ -6,11 +6,11 @@ use crate::failure::{Failure, Status, as_lines};
 use crate::feed::{Heard, Listener, Wish};
 use crate::interrupts::Interrupts;
 use crate::observed_run::observed_run;
+use crate::output_directory::refuse_to_overwrite;
 use crate::print::{print_error, print_out};
 use mikoshi_coordinator::build_hybrid_law;
 use mikoshi_recording::Recording;
 use mikoshi_resolution::{read_run, world_file};
-use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -73,18 +73,6 @@ enum Ended {
     Run,
     Supervisor,
     Interrupted,
-}
-
-fn refuse_to_overwrite(out: &Path, force: bool) -> Result<(), Failure> {
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(!force).create(true);
-    match options.open(out) {
-        Ok(_) => Ok(()),
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            Err(Failure::usage(format!("{}: exists: choose another, or add --force", out.display())))
-        }
-        Err(error) => Err(Failure::usage(error).context(out.display())),
-    }
 }
 
 fn tell(ticks: Option<(u64, u64)>, lost: u64, out: &Path) -> String {
