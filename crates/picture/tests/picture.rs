@@ -57,7 +57,7 @@ fn every_view_shows_the_object_and_every_robot() {
     let out = folder.path().join("picture.png");
     let moment = moment(&run, 0.0);
     for view in [View::Top, View::Side, View::Follow] {
-        draw(&run, &[moment.clone()], &moment, view, SIZE, &out).expect("there is OpenGL");
+        draw(&run, core::slice::from_ref(&moment), &moment, view, SIZE, &out).expect("there is OpenGL");
         let pixels = pixels_of(&out);
         let count = |is: fn([u8; 3]) -> bool| pixels.iter().filter(|pixel| is(**pixel)).count();
         // The first robot is blue, the second orange; floor and sky are nearly grey.

@@ -152,6 +152,13 @@ neither a display nor a window.
 
 Exit status: 0 it is written, 2 the log can't be read or the file can't be written, 3 there is no OpenGL.";
 
+const CHECK_ROBOT_EXAMPLES: &str = "\
+Examples:
+  mikoshi check-robot config/robots/hrp2.toml
+  mikoshi check-robot /opt/robots/talos.urdf           (what a URDF alone comes to)
+
+Exit status: 0 it can be used, 2 it can't, and what is missing is said, with the line of the key.";
+
 const SWEEP_EXAMPLES: &str = "\
 Examples:
   mikoshi sweep config/sweeps/robust.toml
@@ -213,6 +220,9 @@ pub enum Command {
     Sweep(SweepArguments),
     /// Show what a scenario comes to: arms, matrices, gains, schedule, limits
     Plan(PlanArguments),
+    /// Check whether a robot's files can be used: frames, limits, inertias, drives, sensors, and how far it reaches
+    #[command(after_help = CHECK_ROBOT_EXAMPLES)]
+    CheckRobot(CheckRobotArguments),
     /// List the runs of this machine and their processes
     Status(StatusArguments),
     /// Check whether this machine is fit to run, and say how to make it so
@@ -500,6 +510,14 @@ pub struct PlanArguments {
     /// Print it as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `mikoshi check-robot`.
+#[derive(Args, Debug)]
+pub struct CheckRobotArguments {
+    /// A robot's configuration, or a URDF
+    #[arg(value_name = "ROBOT.toml|URDF")]
+    pub file: PathBuf,
 }
 
 /// `mikoshi status`.

@@ -68,6 +68,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),
+        Command::CheckRobot(arguments) => commands::check_robot::check_robot(arguments).map(|()| Status::Met),
         Command::Status(arguments) => commands::status::status(arguments).map(|()| Status::Met),
         Command::Doctor(arguments) => commands::doctor::doctor(arguments),
     })

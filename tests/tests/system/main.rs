@@ -2,6 +2,7 @@
 
 mod adoption;
 mod bad_input;
+mod check_robot;
 mod command;
 mod determinism;
 mod environment;
