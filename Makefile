@@ -1,4 +1,4 @@
-# `make demo` and `make test` do all the set-up they need: a checkout, cargo, a C compiler and python3
+# `make demo` and `make test` do all the set-up they need: a checkout, cargo, C and C++ compilers and python3
 # suffice. One build profile serves everything, so a clean checkout compiles its dependencies once.
 
 CARGO ?= cargo
@@ -17,6 +17,7 @@ help: ## List the targets
 setup: ## Fetch MuJoCo's library (once) into .mujoco/run-make-setup
 	@command -v $(CARGO) >/dev/null || { echo "make: cargo is missing: see https://rustup.rs" >&2; exit 1; }
 	@command -v cc >/dev/null || { echo "make: a C compiler (cc) is missing" >&2; exit 1; }
+	@command -v c++ >/dev/null || { echo "make: a C++ compiler (c++) is missing" >&2; exit 1; }
 	@scripts/setup-mujoco
 
 build: setup ## Build target/release/mikoshi and the services beside it
@@ -28,6 +29,7 @@ demo: build ## Four robots walk and carry one object
 test: build ## Run every test
 	$(CARGO) test --release --workspace
 	$(CARGO) test $(PEERS)
+	@scripts/test-log-readers
 
 bench: setup ## Run the benchmarks
 	$(CARGO) bench --workspace

@@ -35,6 +35,6 @@ pub use load::{LoadedRobot, LoadedScenario, load_robot, load_scenario};
 pub use origin::Origin;
 pub use robot::RobotConfig;
 pub use run::{DecodeRunError, RobotSpec, RunSpec};
-pub use save::{SaveScenarioError, save_scenario};
+pub use save::{SaveScenarioError, ScenarioTextError, save_scenario, scenario_text};
 pub use scenario::Scenario;
 pub use sweep::{LoadedSweep, Sweep, SweepRun, load_sweep};

@@ -146,18 +146,32 @@ pub fn load_robot(dir: &Path, model: &str) -> Result<LoadedRobot, LoadConfigErro
     refuse(&document, validate::robot(&config, model))?;
     for (name, folder) in &mut config.packages {
         // Absolute: every process of a run finds the same meshes, wherever it was started.
-        let found = std::path::absolute(dir.join(&folder)).ok().filter(|found| found.is_dir());
+        let place =
+            expanded(folder).map_err(|problem| document.key_error(&format!("packages.{name}"), problem))?;
+        let found = std::path::absolute(dir.join(place)).ok().filter(|found| found.is_dir());
         *folder = found.and_then(|found| found.into_os_string().into_string().ok()).ok_or_else(|| {
             let problem = format!("found {folder:?}, expected a folder beside this file");
             document.key_error(&format!("packages.{name}"), problem)
         })?;
     }
-    let urdf_path = dir.join(&config.urdf);
+    let place = expanded(&config.urdf).map_err(|problem| document.key_error("urdf", problem))?;
+    let urdf_path = dir.join(place);
     let urdf = fs::read_to_string(&urdf_path).map_err(|error| {
         let problem = format!("found {:?}, expected a file beside this one: {error}", config.urdf);
         document.key_error("urdf", problem)
     })?;
     Ok(LoadedRobot { config, urdf, urdf_path, document })
+}
+
+/// A path that may begin with an environment variable, as `${NAME}/`, or what is wrong with it.
+fn expanded(path: &str) -> Result<PathBuf, String> {
+    let Some((name, rest)) = path.strip_prefix("${").and_then(|rest| rest.split_once('}')) else {
+        return Ok(path.into());
+    };
+    match std::env::var_os(name).filter(|value| !value.is_empty()) {
+        Some(value) => Ok(Path::new(&value).join(rest.trim_start_matches('/'))),
+        None => Err(format!("found {path:?}, expected the environment variable {name} to say where that is")),
+    }
 }
 
 fn load_models(

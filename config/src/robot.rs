@@ -9,11 +9,15 @@ use std::collections::BTreeMap;
 pub struct RobotConfig {
     /// Name of the model.
     pub name: String,
-    /// URDF beside this file.
+    /// URDF beside this file, or wherever a path leads; `${NAME}/` at its beginning is an environment variable.
     pub urdf: String,
-    /// Where `package://NAME/` leads: relative to this file where it is written, absolute once it is loaded.
+    /// Where `package://NAME/` leads: relative to this file where it is written, or from a variable as above; absolute
+    /// once it is loaded.
     #[serde(default)]
     pub packages: BTreeMap<String, String>,
+    /// What becomes of shapes that are meshes.
+    #[serde(default)]
+    pub meshes: Meshes,
     /// Grasping hands, in order (right, left).
     pub hands: Vec<HandConfig>,
     /// Feet, in order (right, left).
@@ -30,6 +34,17 @@ pub struct RobotConfig {
     pub com_height_m: f64,
     /// Lateral distance between the ankles' centres while standing.
     pub foot_spacing_m: f64,
+}
+
+/// What becomes of shapes that are meshes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Meshes {
+    /// Their files are needed.
+    #[default]
+    Needed,
+    /// They are left out: what has no other shape touches nothing.
+    LeftOut,
 }
 
 /// A hand that can grasp.
@@ -74,4 +89,32 @@ pub struct DriveConfig {
     pub kv_nms_rad: f64,
     /// Reflected rotor inertia.
     pub armature_kg_m2: f64,
+}
+
+impl DriveConfig {
+    /// Whether it drives this joint, if no drive before it does.
+    pub fn is_for(&self, joint: &str) -> bool {
+        match self.joints.split_once('*') {
+            None => self.joints == joint,
+            Some((head, tail)) => {
+                joint.len() >= head.len() + tail.len() && joint.starts_with(head) && joint.ends_with(tail)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_star_stands_for_any_text_but_overlaps_nothing() {
+        let is_for = |joints: &str, joint| {
+            let (joints, [kp_nm_rad, kv_nms_rad, armature_kg_m2]) = (joints.to_owned(), [1.0; 3]);
+            DriveConfig { joints, kp_nm_rad, kv_nms_rad, armature_kg_m2 }.is_for(joint)
+        };
+        assert!(is_for("RLEG_*", "RLEG_JOINT0") && is_for("*_JOINT0", "RLEG_JOINT0"));
+        assert!(is_for("R*0", "RLEG_JOINT0") && is_for("*", "x") && is_for("a", "a"));
+        assert!(!is_for("RLEG_*", "LLEG_JOINT0") && !is_for("aba*ba", "aba") && !is_for("a", "ab"));
+    }
 }

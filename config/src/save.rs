@@ -7,6 +7,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// A scenario that TOML has no words for.
+pub type ScenarioTextError = toml::ser::Error;
+
 /// A scenario could not be saved.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs)]
@@ -14,7 +17,15 @@ pub enum SaveScenarioError {
     #[error("{}: cannot be written: {source}", path.display())]
     WriteFile { path: PathBuf, source: io::Error },
     #[error("a scenario that TOML has no words for: {0}")]
-    Encode(#[from] toml::ser::Error),
+    Encode(#[from] ScenarioTextError),
+}
+
+/// A run's scenario as a file, with its team and all overrides in it.
+///
+/// # Errors
+/// TOML has no words for it.
+pub fn scenario_text(run: &RunSpec) -> Result<String, ScenarioTextError> {
+    toml::to_string(&Scenario { team: None, ..run.scenario.clone() })
 }
 
 /// Writes a run's scenario to `path`, with its team and all overrides in it, and its robots into the
@@ -27,8 +38,7 @@ pub fn save_scenario(run: &RunSpec, path: &Path) -> Result<(), SaveScenarioError
     };
     let write = |path: &Path, text: &str| fs::write(path, text).map_err(failed(path));
 
-    let scenario = Scenario { team: None, ..run.scenario.clone() };
-    write(path, &toml::to_string(&scenario)?)?;
+    write(path, &scenario_text(run)?)?;
     let folder = robots_beside(path);
     fs::create_dir_all(&folder).map_err(failed(&folder))?;
     for robot in &run.robots {

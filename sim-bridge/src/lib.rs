@@ -34,6 +34,7 @@ mod truth;
 mod world;
 
 pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
+pub use mjcf::{MAX_PICTURE_HEIGHT, MAX_PICTURE_WIDTH, OBJECT, qualified};
 pub use participant::{BridgeParticipant, BuildBridgeError};
 pub use world::{World, world_xml};
 

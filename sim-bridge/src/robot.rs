@@ -44,7 +44,7 @@ impl<'a> Robot<'a> {
             |(frame, sensor): (FrameId, ForceTorqueSensor)| Extremity { frame, sensor: sensor.frame };
         let hands: Vec<_> = palms.into_iter().zip(wrist_sensors).map(extremity).collect();
         let feet = soles.into_array().into_iter().zip(ankle_sensors.into_array()).map(extremity).collect();
-        let drive = |joint: &str| config.drives.iter().find(|drive| matches(&drive.joints, joint));
+        let drive = |joint: &str| config.drives.iter().find(|drive| drive.is_for(joint));
         let drives = model.joints().iter().map(|joint| {
             drive(&joint.name).ok_or_else(|| BuildWorldError::NoDrive {
                 robot: spec.member.name.clone(),
@@ -120,16 +120,6 @@ impl<'a> Robot<'a> {
     }
 }
 
-/// Whether a name matches a pattern with at most one `*`.
-fn matches(pattern: &str, name: &str) -> bool {
-    match pattern.split_once('*') {
-        None => pattern == name,
-        Some((head, tail)) => {
-            name.len() >= head.len() + tail.len() && name.starts_with(head) && name.ends_with(tail)
-        }
-    }
-}
-
 /// From `[x, y, z, qw, qx, qy, qz]`.
 pub fn isometry(pose: &[f64; 7]) -> Isometry3<f64> {
     let [x, y, z, qw, qx, qy, qz] = *pose;
@@ -137,16 +127,4 @@ pub fn isometry(pose: &[f64; 7]) -> Isometry3<f64> {
         Translation3::new(x, y, z),
         UnitQuaternion::new_normalize(Quaternion::new(qw, qx, qy, qz)),
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_star_stands_for_any_text_but_overlaps_nothing() {
-        assert!(matches("RLEG_*", "RLEG_JOINT0") && matches("*_JOINT0", "RLEG_JOINT0"));
-        assert!(matches("R*0", "RLEG_JOINT0") && matches("*", "x") && matches("a", "a"));
-        assert!(!matches("RLEG_*", "LLEG_JOINT0") && !matches("aba*ba", "aba") && !matches("a", "ab"));
-    }
 }

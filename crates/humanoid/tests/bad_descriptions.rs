@@ -182,3 +182,14 @@ fn a_name_that_the_robot_lacks_is_answered_with_the_names_it_has() {
     );
     assert!(model.find_frame("palm").unwrap_err().to_string().contains("base, arm"));
 }
+
+#[test]
+fn a_mass_at_a_point_and_a_fixed_joint_that_mimics_are_taken_as_they_are() {
+    let point = r#"<inertial><mass value="0.5"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>"#;
+    let fixed = joint("weld", "fixed", "arm", "camera", r#"<mimic joint="shoulder"/>"#);
+    let parts = [arm(LIMIT, MASS), vec![link("camera", point), fixed]].concat();
+    let model = load(&parts).expect("it can move");
+    assert_eq!((model.joint_count(), model.total_mass_kg()), (1, 2.5));
+    // What moves by itself is no point.
+    assert!(refusal(&arm(LIMIT, point)).contains("without an inertia about every axis"));
+}

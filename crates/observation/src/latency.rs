@@ -469,7 +469,7 @@ mod tests {
     fn what_others_do_while_a_tick_is_due_is_counted_once() {
         let busy = tick(7, 1_000_000, 0);
         // States take from 1 to 34 µs, the coordinator from 39 to 45, commands from 52 to 93.
-        let of = |from_ns, to_ns| busy_ns(&busy, 1_000_000 + from_ns, 1_000_000 + to_ns);
+        let of = |from_ns: u64, to_ns: u64| busy_ns(&busy, 1_000_000 + from_ns, 1_000_000 + to_ns);
         assert_eq!(of(0, 200_000), 33_000 + 6_000 + 41_000);
         assert_eq!(of(10_000, 20_000), 10_000);
         assert_eq!(of(42_000, 60_000), 3_000 + 8_000);

@@ -21,7 +21,7 @@ pub use canonical::{LogHash, Observation, Observed, PayloadRef};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use freshness::Freshness;
 pub use latency::{LateTick, LatencyFigures, PhaseTimes, Span, SpanSummary, WorstTick, times_ns};
-pub use log::{LogWriter, WriteLogError};
+pub use log::{ChannelSchema, LogWriter, WriteLogError};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{
     Fault, InternalSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary, Summary, Swap, Timing,

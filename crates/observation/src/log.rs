@@ -2,7 +2,7 @@
 //!
 //! Each topic is a channel `payload/robot`. Messages hold the payload's bytes as they travelled, little
 //! endian; the channel's schema lists the fields with type, offset and size, so that a reader needs
-//! nothing but the file.
+//! nothing but the file. What others make of the frames may lie on channels beside them.
 
 use crate::canonical::{Kind, Observation, PayloadRef};
 use core::fmt::Write as _;
@@ -22,7 +22,21 @@ pub(crate) const ENCODING: &str = "mikoshi";
 pub(crate) const RUN_ATTACHMENT: &str = "run.bin";
 /// Opens the names of attachments that hold the run as one service has it from a tick on.
 pub(crate) const REVISION_PREFIX: &str = "run-from-";
+const BINARY: &str = "application/octet-stream";
 const BUFFER_BYTES: usize = 1 << 20;
+
+/// What a channel beside the frames carries.
+#[derive(Clone, Copy, Debug)]
+pub struct ChannelSchema<'a> {
+    /// The name by which tools know what to do with it.
+    pub name: &'a str,
+    /// The language of `data`, such as `protobuf`.
+    pub encoding: &'a str,
+    /// The schema itself.
+    pub data: &'a [u8],
+    /// What messages are encoded in.
+    pub message_encoding: &'a str,
+}
 
 /// Why a log could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -50,17 +64,10 @@ impl LogWriter {
         let file =
             File::create(path).map_err(|source| WriteLogError::Create { path: path.to_owned(), source })?;
         let options = WriteOptions::new().compression(Some(Compression::Lz4)).profile(PROFILE);
-        let mut writer = options.create(BufWriter::with_capacity(BUFFER_BYTES, file))?;
-        let bytes = run.encode();
-        writer.attach(&Attachment {
-            log_time: 0,
-            create_time: 0,
-            name: RUN_ATTACHMENT.to_owned(),
-            media_type: "application/octet-stream".to_owned(),
-            data: Cow::Borrowed(&bytes),
-        })?;
+        let writer = options.create(BufWriter::with_capacity(BUFFER_BYTES, file))?;
         let period_ns = (run.scenario.control_period_s * 1e9).round() as u64;
         let mut log = Self { writer, channels: BTreeMap::new(), period_ns };
+        log.attach(RUN_ATTACHMENT, BINARY, &run.encode())?;
         let names: Vec<&str> = run.robots.iter().map(|robot| robot.member.name.as_str()).collect();
         for kind in Kind::ALL {
             log.add_channels(kind, if kind.is_per_robot { &names } else { &["team"] })?;
@@ -88,15 +95,55 @@ impl LogWriter {
         service: ServiceId,
         run: &RunSpec,
     ) -> Result<(), WriteLogError> {
-        let bytes = run.encode();
+        let name = format!("{REVISION_PREFIX}{tick}-{service}.bin");
+        self.attach_at(self.time_ns(tick), &name, BINARY, &run.encode())
+    }
+
+    /// Attaches a file, for those who want to see what the run was made of.
+    ///
+    /// # Errors
+    /// The log can't be written.
+    pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), WriteLogError> {
+        self.attach_at(0, name, media_type, data)
+    }
+
+    fn attach_at(
+        &mut self,
+        log_time: u64,
+        name: &str,
+        media_type: &str,
+        data: &[u8],
+    ) -> Result<(), WriteLogError> {
         self.writer.attach(&Attachment {
-            log_time: tick * self.period_ns,
+            log_time,
             create_time: 0,
-            name: format!("{REVISION_PREFIX}{tick}-{service}.bin"),
-            media_type: "application/octet-stream".to_owned(),
-            data: Cow::Borrowed(&bytes),
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+            data: Cow::Borrowed(data),
         })?;
         Ok(())
+    }
+
+    /// A channel beside the frames. [`LogReader`](crate::LogReader) passes over it.
+    ///
+    /// # Errors
+    /// The file can't be written.
+    pub fn add_channel(&mut self, topic: &str, schema: &ChannelSchema<'_>) -> Result<u16, WriteLogError> {
+        let id = self.writer.add_schema(schema.name, schema.encoding, schema.data)?;
+        Ok(self.writer.add_channel(id, topic, schema.message_encoding, &BTreeMap::new())?)
+    }
+
+    /// Appends a message to a channel beside the frames.
+    ///
+    /// # Errors
+    /// The file can't be written.
+    pub fn write_beside(&mut self, channel: u16, tick: u64, bytes: &[u8]) -> Result<(), WriteLogError> {
+        self.write_message(channel, tick, bytes)
+    }
+
+    /// When a tick begins, by the log.
+    pub fn time_ns(&self, tick: u64) -> u64 {
+        tick * self.period_ns
     }
 
     /// Appends all frames of a tick.
@@ -117,14 +164,18 @@ impl LogWriter {
         let Some(&channel_id) = self.channels.get(&(payload.name, payload.robot)) else {
             return Ok(());
         };
-        let time_ns = payload.tick * self.period_ns;
+        self.write_message(channel_id, payload.tick, payload.bytes)
+    }
+
+    fn write_message(&mut self, channel_id: u16, tick: u64, bytes: &[u8]) -> Result<(), WriteLogError> {
+        let time_ns = self.time_ns(tick);
         let header = MessageHeader {
             channel_id,
-            sequence: u32::try_from(payload.tick).unwrap_or(u32::MAX),
+            sequence: u32::try_from(tick).unwrap_or(u32::MAX),
             log_time: time_ns,
             publish_time: time_ns,
         };
-        Ok(self.writer.write_to_known_channel(&header, payload.bytes)?)
+        Ok(self.writer.write_to_known_channel(&header, bytes)?)
     }
 
     /// Writes the index and closes the file.

@@ -6,12 +6,14 @@
 
 #![allow(non_snake_case)]
 
+mod check;
 mod motion;
 mod robot;
 mod run_file;
 mod schedule;
 mod surface;
 
+pub use check::{CheckedRobot, check_robot};
 pub use run_file::{RunFileError, read_run, read_spec, world_file, write_run, write_spec, write_world};
 pub use schedule::tick_schedule;
 

@@ -4,7 +4,7 @@ use crate::surface::distance_to_box;
 use core::fmt::Display;
 use mikoshi_config::robot::HandConfig;
 use mikoshi_config::scenario::{Member, Object as ObjectConfig};
-use mikoshi_config::{LoadConfigError, LoadedRobot, LoadedScenario, RobotSpec};
+use mikoshi_config::{LoadConfigError, LoadedRobot, LoadedScenario, RobotConfig, RobotSpec};
 use mikoshi_humanoid::balance::{PerFoot, Side};
 use mikoshi_humanoid::ik::{IkScratch, IkTargets, SettlePostureError};
 use mikoshi_ipc_types::MAX_HANDS;
@@ -18,7 +18,7 @@ const PALM_TO_SURFACE_M: f64 = 0.020;
 
 /// A robot's own frame on the ground: midpoint between its soles, x ahead, z up.
 #[derive(Clone, Copy, Debug)]
-enum Ground {}
+pub(crate) enum Ground {}
 impl CoordinateFrame for Ground {}
 
 /// Every model of the team, read once.
@@ -78,13 +78,7 @@ pub(crate) fn resolve_robot(
         hand_in_object.push(X_AH.to_array());
     }
 
-    let mut targets = IkTargets {
-        stance: Side::Right,
-        feet: PerFoot::from_fn(|side| X_WG * standing_foot(side, config.foot_spacing_m)),
-        com: X_WG.transform_point(&Vector3::new(0.0, 0.0, config.com_height_m)),
-        waist_attitude: X_WG.rotation,
-        hands,
-    };
+    let mut targets = standing(&X_WG, config, hands);
     let mut settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
     if let Some(job) = &scenario.scenario.job {
         for hand in targets.hands.iter_mut().flatten() {
@@ -101,6 +95,21 @@ pub(crate) fn resolve_robot(
         grasping_hands,
         hand_in_object,
     })
+}
+
+/// A robot that stands here, with its hands there.
+pub(crate) fn standing(
+    X_WG: &Pose<World, Ground>,
+    config: &RobotConfig,
+    hands: [Option<Pose<World, Hand>>; MAX_HANDS],
+) -> IkTargets {
+    IkTargets {
+        stance: Side::Right,
+        feet: PerFoot::from_fn(|side| *X_WG * standing_foot(side, config.foot_spacing_m)),
+        com: X_WG.transform_point(&Vector3::new(0.0, 0.0, config.com_height_m)),
+        waist_attitude: X_WG.rotation,
+        hands,
+    }
 }
 
 fn grasping_hands(
@@ -135,7 +144,7 @@ fn heading(yaw_deg: f64) -> UnitQuaternion<f64> {
 }
 
 /// Where a robot holds: X_GH.
-fn carry_pose(hand: &HandConfig) -> Pose<Ground, Hand> {
+pub(crate) fn carry_pose(hand: &HandConfig) -> Pose<Ground, Hand> {
     let rows = &hand.carry_rotation;
     let matrix = Matrix3::from_fn(|row, column| rows[row][column]);
     // The configuration's rotation is checked to be one, to the digits that people write.

@@ -4,6 +4,7 @@
 //! all agree on it. No control, no simulator; the file system is only asked whether a mesh is there.
 
 use mikoshi_config::RobotConfig;
+use mikoshi_config::robot::Meshes;
 use mikoshi_humanoid::balance::PerFoot;
 use mikoshi_humanoid::estimate::{ForceTorqueSensor, SoleRectangle};
 use mikoshi_humanoid::ik::ConfigureIkError;
@@ -53,8 +54,11 @@ impl Robot {
     pub fn new(config: &RobotConfig, urdf: &str) -> Result<Self, MatchRobotError> {
         let packages = config.packages.iter().map(|(name, path)| (name.clone(), path.into()));
         let packages = PackageTable(packages.collect());
-        let model = Model::from_urdf(urdf, &|mesh| packages.find(mesh))
-            .map_err(|error| mismatch("urdf", format!("{}: {error}", config.urdf)))?;
+        let model = match config.meshes {
+            Meshes::Needed => Model::from_urdf(urdf, &|mesh| packages.find(mesh)),
+            Meshes::LeftOut => Model::from_urdf(urdf, &|mesh| Some(mesh.into())).map(Model::without_meshes),
+        };
+        let model = model.map_err(|error| mismatch("urdf", format!("{}: {error}", config.urdf)))?;
         let frame = |key: &str, link: &str| {
             model.find_frame(link).map_err(|error| mismatch(key, lacks(config, &error)))
         };

@@ -1,6 +1,7 @@
 //! What can be typed.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mikoshi_recording::DEFAULT_VIEW_HZ;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
@@ -139,6 +140,25 @@ left out, and the page says why.
 
 Exit status: 0 it is written, 2 the folder holds no run that can be read.";
 
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  mikoshi render runs/transport-0/run.mcap --out walk.mp4
+  mikoshi render runs/transport-0/run.mcap --out walk.mp4 --camera top --from 10 --to 20 --size 640x480
+  mikoshi render runs/transport-0/run.mcap --out end.png --camera side
+  mikoshi render runs/transport-0/run.mcap --out frame.png --at 12.5
+
+The simulator's renderer draws what was truly there. It needs OpenGL through EGL, in hardware or in software, and
+neither a display nor a window.
+
+Exit status: 0 it is written, 2 the log can't be read or the file can't be written, 3 there is no OpenGL.";
+
+const CHECK_ROBOT_EXAMPLES: &str = "\
+Examples:
+  mikoshi check-robot config/robots/hrp2.toml
+  mikoshi check-robot /opt/robots/talos.urdf           (what a URDF alone comes to)
+
+Exit status: 0 it can be used, 2 it can't, and what is missing is said, with the line of the key.";
+
 const SWEEP_EXAMPLES: &str = "\
 Examples:
   mikoshi sweep config/sweeps/robust.toml
@@ -192,11 +212,17 @@ pub enum Command {
     /// Draw the paper's figures from a run's results, or from two runs laid over each other
     #[command(after_help = REPORT_EXAMPLES)]
     Report(ReportArguments),
+    /// Draw a recorded run as a film or a picture, without a display
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(RenderArguments),
     /// Run a scenario many times, by seed over ranges of parameters; finished runs are not done again
     #[command(after_help = SWEEP_EXAMPLES)]
     Sweep(SweepArguments),
     /// Show what a scenario comes to: arms, matrices, gains, schedule, limits
     Plan(PlanArguments),
+    /// Check whether a robot's files can be used: frames, limits, inertias, drives, sensors, and how far it reaches
+    #[command(after_help = CHECK_ROBOT_EXAMPLES)]
+    CheckRobot(CheckRobotArguments),
     /// List the runs of this machine and their processes
     Status(StatusArguments),
     /// Check whether this machine is fit to run, and say how to make it so
@@ -245,9 +271,20 @@ pub struct ResultsArguments {
     /// No progress and no table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
-    /// Record no frames: run.mcap takes 2.6 MB for each second of four robots
+    /// Record no frames: run.mcap takes 3.6 MB for each second of four robots
     #[arg(long)]
     pub no_log: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub views: ViewArguments,
+}
+
+/// What logs hold beside frames.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ViewArguments {
+    /// How often a second of the run is written down for Foxglove and the like; 0: frames only
+    #[arg(long, value_name = "HZ", default_value_t = DEFAULT_VIEW_HZ, value_parser = rate)]
+    pub view_hz: f64,
 }
 
 /// `mikoshi adopt`.
@@ -274,6 +311,9 @@ pub struct RecordArguments {
     /// Errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub views: ViewArguments,
 }
 
 /// `mikoshi replay`.
@@ -393,6 +433,49 @@ pub struct ReportArguments {
     pub out: Option<PathBuf>,
 }
 
+/// `mikoshi render`.
+#[derive(Args, Debug)]
+pub struct RenderArguments {
+    /// The log of a run
+    #[arg(value_name = "RUN.MCAP")]
+    pub log: PathBuf,
+    /// What to draw: a film, or a picture of one moment
+    #[arg(long, value_name = "FILE.mp4|FILE.png")]
+    pub out: PathBuf,
+    /// Where to look from
+    #[arg(long, value_enum, default_value_t = CameraChoice::Follow)]
+    pub camera: CameraChoice,
+    /// The moment of a picture [default: the last one]
+    #[arg(long, value_name = "SECONDS")]
+    pub at: Option<f64>,
+    /// Where a film begins
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    pub from: f64,
+    /// Where a film ends [default: with the run]
+    #[arg(long, value_name = "SECONDS")]
+    pub to: Option<f64>,
+    /// Pictures a second of a film
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = positive_rate)]
+    pub fps: f64,
+    /// Width and height in pixels, even numbers, at most 1920x1080
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = width_and_height)]
+    pub size: (u32, u32),
+    /// Replace the file if it is there
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Where to look from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CameraChoice {
+    /// From above, all of the way
+    Top,
+    /// From aside, all of the way
+    Side,
+    /// From ahead and above, along with the object
+    Follow,
+}
+
 /// `mikoshi sweep`.
 #[derive(Args, Debug)]
 pub struct SweepArguments {
@@ -429,6 +512,14 @@ pub struct PlanArguments {
     pub json: bool,
 }
 
+/// `mikoshi check-robot`.
+#[derive(Args, Debug)]
+pub struct CheckRobotArguments {
+    /// A robot's configuration, or a URDF
+    #[arg(value_name = "ROBOT.toml|URDF")]
+    pub file: PathBuf,
+}
+
 /// `mikoshi status`.
 #[derive(Args, Debug)]
 pub struct StatusArguments {
@@ -446,6 +537,24 @@ pub struct DoctorArguments {
     /// Remove what dead runs have left
     #[arg(long)]
     pub clean: bool,
+}
+
+fn positive_rate(typed: &str) -> Result<f64, String> {
+    let hz = typed.parse().ok().filter(|hz: &f64| (0.1..=1000.0).contains(hz));
+    hz.ok_or_else(|| "expected a rate from 0.1 to 1000 Hz".to_owned())
+}
+
+fn width_and_height(typed: &str) -> Result<(u32, u32), String> {
+    let size =
+        typed.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    let fits = |edge: u32, most| (16..=most).contains(&edge) && edge.is_multiple_of(2);
+    size.filter(|&(width, height)| fits(width, 1920) && fits(height, 1080))
+        .ok_or_else(|| "expected WIDTHxHEIGHT, even numbers from 16x16 to 1920x1080".to_owned())
+}
+
+fn rate(typed: &str) -> Result<f64, String> {
+    let hz = typed.parse().ok().filter(|hz: &f64| hz.is_finite() && *hz >= 0.0);
+    hz.ok_or_else(|| "expected a rate in Hz, or 0".to_owned())
 }
 
 fn key_and_value(typed: &str) -> Result<(String, String), String> {

@@ -1,8 +1,8 @@
 //! The mikoshi command: run, replay, swap, report, sweep, plan, status, doctor.
 //!
 //! Two programs share this library: `mikoshi`, which runs a scenario as one process per service, and
-//! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process` and `mikoshi replay`
-//! become.
+//! `mikoshi-in-process`, which runs it in one thread and is what `mikoshi run --in-process`, `mikoshi replay`
+//! and `mikoshi render` become.
 //! Only the latter links to the simulator: without its library `mikoshi` still starts, and says what is
 //! missing.
 
@@ -43,7 +43,7 @@ mod sweep;
 mod table;
 mod wall_clock;
 
-use arguments::{Arguments, Command, ReplayArguments, RunArguments};
+use arguments::{Arguments, Command, RenderArguments, ReplayArguments, RunArguments};
 use clap::Parser;
 use failure::{Failure, Status, as_lines};
 use std::env;
@@ -59,7 +59,7 @@ pub fn main_of_command() -> ExitCode {
         Command::Run(arguments) => commands::run::run(arguments, supervisor::supervise),
         Command::Adopt(arguments) => commands::adopt::adopt(arguments),
         Command::Record(arguments) => commands::record::record(arguments),
-        Command::Replay(_) => become_in_process(),
+        Command::Replay(_) | Command::Render(_) => become_in_process(),
         Command::Swap(arguments) => commands::swap::swap(arguments).map(|()| Status::Met),
         Command::Stop(arguments) => commands::operator::stop(arguments).map(|()| Status::Met),
         Command::Resume(arguments) => commands::operator::resume(arguments).map(|()| Status::Met),
@@ -68,17 +68,19 @@ pub fn main_of_command() -> ExitCode {
         Command::Report(arguments) => commands::report::report(arguments).map(|()| Status::Met),
         Command::Sweep(arguments) => commands::sweep::sweep(arguments),
         Command::Plan(arguments) => commands::plan::plan(arguments).map(|()| Status::Met),
+        Command::CheckRobot(arguments) => commands::check_robot::check_robot(arguments).map(|()| Status::Met),
         Command::Status(arguments) => commands::status::status(arguments).map(|()| Status::Met),
         Command::Doctor(arguments) => commands::doctor::doctor(arguments),
     })
 }
 
-/// `mikoshi-in-process` reads the same command line; `run` and `replay` carry out what it asks for. Asked for its
+/// `mikoshi-in-process` reads the same command line; `run`, `replay` and `render` carry out what it asks for. Asked for its
 /// version, it says which simulator it has.
 pub fn main_of_in_process(
     simulator: &str,
     run: impl FnOnce(&RunArguments) -> Result<Status, Failure>,
     replay: impl FnOnce(&ReplayArguments) -> Result<Status, Failure>,
+    render: impl FnOnce(&RenderArguments) -> Result<(), Failure>,
 ) -> ExitCode {
     if env::args_os().skip(1).eq(["--version"]) {
         print::print_out(&format!("{simulator}\n"));
@@ -88,9 +90,10 @@ pub fn main_of_in_process(
     conclude(match &Arguments::parse().command {
         Command::Run(arguments) => run(arguments),
         Command::Replay(arguments) => replay(arguments),
+        Command::Render(arguments) => render(arguments).map(|()| Status::Met),
         _ => Err(Failure {
             status: Status::Usage,
-            message: "this program only runs and replays in one thread: use `mikoshi`".to_owned(),
+            message: "this program only runs, replays and renders in one thread: use `mikoshi`".to_owned(),
         }),
     })
 }

@@ -15,11 +15,11 @@ use crate::wall_clock::Stopwatch;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
-    Fault, Figures, Freshness, LatencyFigures, LogHash, LogWriter, Observation, Summary, Swap, Timing,
-    WriteLogError,
+    Fault, Figures, Freshness, LatencyFigures, LogHash, Observation, Summary, Swap, Timing, WriteLogError,
 };
+use mikoshi_recording::Recording;
 use mikoshi_runtime::Board;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Observes a run: figures, hash, log, progress.
 pub struct RunObserver {
@@ -28,7 +28,9 @@ pub struct RunObserver {
     /// Where times are measured.
     latency: Option<(LatencyFigures, Costs)>,
     hash: LogHash,
-    log: Option<LogWriter>,
+    log: Option<Recording>,
+    /// Where the run leaves the world's description.
+    world: PathBuf,
     /// Why and from which tick on there is no log.
     log_failure: Option<String>,
     feed: Option<Feed>,
@@ -56,12 +58,16 @@ impl RunObserver {
         out: &OutputDirectory,
     ) -> Result<Self, Failure> {
         let run = &prepared.run;
-        let log = (!arguments.no_log).then(|| LogWriter::create(&out.run_log(), run));
+        let observed = observed_run(run, prepared.law.internal_forces())?;
+        // Services that compute nothing have nothing to show.
+        let view_hz = if prepared.is_empty { 0.0 } else { arguments.views.view_hz };
+        let log = (!arguments.no_log).then(|| Recording::create(&out.run_log(), run, &observed, view_hz));
         Ok(Self {
-            figures: Some(Figures::new(observed_run(run, prepared.law.internal_forces())?)),
+            figures: Some(Figures::new(observed)),
             latency: None,
             hash: LogHash::default(),
             log: log.transpose().map_err(Failure::fault)?,
+            world: out.world(),
             log_failure: None,
             feed: None,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, !arguments.quiet),
@@ -187,7 +193,7 @@ impl RunObserver {
     pub fn finish(mut self, run: &RunSpec, faults: Vec<Fault>) -> Summary {
         let wall_time_s = self.clock.elapsed().as_secs_f64();
         self.progress.clear();
-        let written = self.log.take().map_or(Ok(()), LogWriter::finish);
+        let written = self.log.take().map_or(Ok(()), |log| log.finish(&self.world));
         self.note_log(self.ticks, written);
         if let Some(feed) = self.feed.take() {
             feed.end();

@@ -3,7 +3,7 @@
 use crate::arguments::ResultsArguments;
 use crate::failure::Failure;
 use rustix::fs::{FlockOperation, flock};
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -144,6 +144,22 @@ impl OutputDirectory {
     /// What the services had to say.
     pub fn service_logs(&self) -> PathBuf {
         self.path.join(SERVICE_LOGS)
+    }
+}
+
+/// Makes sure that this file can be written, and that nothing precious is lost.
+///
+/// # Errors
+/// It is there, and `force` is not; it can't be written: bad usage.
+pub fn refuse_to_overwrite(out: &Path, force: bool) -> Result<(), Failure> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(!force).create(true);
+    match options.open(out) {
+        Ok(_) => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            Err(Failure::usage(format!("{}: exists: choose another, or add --force", out.display())))
+        }
+        Err(error) => Err(Failure::usage(error).context(out.display())),
     }
 }
 

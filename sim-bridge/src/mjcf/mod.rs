@@ -32,6 +32,22 @@ pub const FLOOR: &str = "floor";
 /// The object's body, geom and joint.
 pub const OBJECT: &str = "object";
 
+/// The largest picture that can be drawn of a world, in pixels.
+pub const MAX_PICTURE_WIDTH: u32 = 1920;
+/// The same in height.
+pub const MAX_PICTURE_HEIGHT: u32 = 1080;
+
+/// What worlds look like; physics knows nothing of it. The floor has squares of half a metre.
+const LOOKS: &str = r#"  <visual>
+    <global offwidth="1920" offheight="1080"/>
+    <headlight ambient="0.35 0.35 0.35" diffuse="0.35 0.35 0.35" specular="0 0 0"/>
+  </visual>
+  <asset>
+    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.95 0.97 1" rgb2="0.7 0.78 0.88" width="64" height="384"/>
+    <texture name="floor" type="2d" builtin="checker" rgb1="0.82 0.82 0.80" rgb2="0.74 0.74 0.72" width="256" height="256"/>
+    <material name="floor" texture="floor" texrepeat="1 1" texuniform="true"/>
+  </asset>"#;
+
 /// The name of a fixed box. No geom of a robot is called so, even of a robot called `world`: theirs have
 /// an index.
 pub fn fixed_box(name: &str) -> String {
@@ -70,14 +86,19 @@ fn write_world(
   </option>
   <default>
     <geom condim="3" friction="{friction} 0.005 0.0001" solref="0.02 1" solimp="0.9 0.95 0.001"/>
-  </default>"#,
+  </default>
+{LOOKS}"#,
         escape(&scenario.name),
         scenario.physics.step_s,
         -GRAVITY_M_S2,
     )?;
     robot::write_meshes(xml, robots)?;
     writeln!(xml, "  <worldbody>")?;
-    writeln!(xml, r#"    <geom name="{FLOOR}" type="plane" size="20 20 1"/>"#)?;
+    writeln!(
+        xml,
+        r#"    <light directional="true" castshadow="false" diffuse="0.45 0.45 0.45" pos="0 0 5" dir="0.3 0.4 -1"/>"#
+    )?;
+    writeln!(xml, r#"    <geom name="{FLOOR}" type="plane" size="20 20 1" material="{FLOOR}"/>"#)?;
     for fixed in &scenario.world.boxes {
         write_fixed_box(xml, fixed)?;
     }

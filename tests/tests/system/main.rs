@@ -2,6 +2,7 @@
 
 mod adoption;
 mod bad_input;
+mod check_robot;
 mod command;
 mod determinism;
 mod environment;
@@ -12,6 +13,7 @@ mod leader_follower;
 mod lost_grasp;
 mod real_time;
 mod record;
+mod render;
 mod replay;
 mod report;
 mod succession;

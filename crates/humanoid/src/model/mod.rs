@@ -162,6 +162,17 @@ impl Model {
         urdf::load(text, find_mesh)
     }
 
+    /// The same without shapes that are meshes.
+    #[must_use]
+    pub fn without_meshes(mut self) -> Self {
+        let is_mesh = |shape: &Shape| matches!(shape.geometry, Geometry::Mesh { .. });
+        for body in &mut self.bodies {
+            body.visuals.retain(|shape| !is_mesh(shape));
+            body.collisions.retain(|shape| !is_mesh(shape));
+        }
+        self
+    }
+
     /// Name of the robot.
     pub fn name(&self) -> &str {
         &self.name

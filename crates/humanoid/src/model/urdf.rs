@@ -149,7 +149,9 @@ impl Builder<'_> {
         link: &urdf_rs::Link,
         parent: FrameId,
     ) -> Result<FrameId, LoadModelError> {
-        if let Some(mimic) = &joint.mimic {
+        // What a fixed joint mimics does not matter.
+        let is_fixed = matches!(joint.joint_type, urdf_rs::JointType::Fixed);
+        if let Some(mimic) = joint.mimic.as_ref().filter(|_| !is_fixed) {
             return Err(LoadModelError::MimicJoint {
                 joint: joint.name.clone(),
                 mimicked: mimic.joint.clone(),
@@ -297,6 +299,14 @@ impl Builder<'_> {
                     .into(),
             });
         }
+        let is_line = |body: &&Body| body.inertial.inertia.symmetric_eigenvalues().min() <= 0.0;
+        if let Some(body) = self.bodies.iter().find(is_line) {
+            return Err(LoadModelError::InvalidInertial {
+                link: body.name.clone(),
+                what: "it moves without an inertia about every axis, and so do the links fixed to it; expected one"
+                    .into(),
+            });
+        }
         let mut paths = vec![0; self.bodies.len()];
         let mut subtree_masses_kg: Vec<f64> = self.bodies.iter().map(|body| body.inertial.mass_kg).collect();
         for (j, joint) in self.joints.iter().enumerate() {
@@ -383,7 +393,8 @@ fn check_inertial(link: &urdf_rs::Link) -> Result<Inertial, LoadModelError> {
         };
     }
     let principal = inertia.symmetric_eigenvalues();
-    if principal.min() <= 0.0 {
+    // A mass at a point, as cameras and markers often are: the body that carries it has an inertia.
+    if inertia.norm() > 0.0 && principal.min() <= 0.0 {
         return invalid(format!(
             "its inertia has a principal moment of {:e} kg m²; expected a positive definite matrix",
             principal.min()

@@ -1,6 +1,7 @@
 //! One module per command.
 
 pub mod adopt;
+pub mod check_robot;
 pub mod doctor;
 pub mod operator;
 pub mod plan;

@@ -5,10 +5,12 @@ use crate::control::find_run;
 use crate::failure::{Failure, Status, as_lines};
 use crate::feed::{Heard, Listener, Wish};
 use crate::interrupts::Interrupts;
+use crate::observed_run::observed_run;
+use crate::output_directory::refuse_to_overwrite;
 use crate::print::{print_error, print_out};
-use mikoshi_observation::LogWriter;
-use mikoshi_resolution::read_run;
-use std::fs::OpenOptions;
+use mikoshi_coordinator::build_hybrid_law;
+use mikoshi_recording::Recording;
+use mikoshi_resolution::{read_run, world_file};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -29,7 +31,9 @@ pub fn record(arguments: &RecordArguments) -> Result<Status, Failure> {
         }
         _ => Failure::fault(error),
     })?;
-    let mut log = LogWriter::create(out, &run).map_err(Failure::fault)?;
+    let world = world_file(&directory);
+    let observed = observed_run(&run, build_hybrid_law(&run).map_err(Failure::fault)?.internal_forces())?;
+    let mut log = Recording::create(out, &run, &observed, arguments.views.view_hz).map_err(Failure::fault)?;
     let (mut ticks, mut lost) = (None, 0);
     let ended = loop {
         match listener.hear().map_err(Failure::fault)? {
@@ -50,7 +54,7 @@ pub fn record(arguments: &RecordArguments) -> Result<Status, Failure> {
             break Ended::Interrupted;
         }
     };
-    log.finish().map_err(Failure::fault)?;
+    log.finish(&world).map_err(Failure::fault)?;
     if !arguments.quiet {
         print_out(&tell(ticks, lost, out));
     }
@@ -69,18 +73,6 @@ enum Ended {
     Run,
     Supervisor,
     Interrupted,
-}
-
-fn refuse_to_overwrite(out: &Path, force: bool) -> Result<(), Failure> {
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(!force).create(true);
-    match options.open(out) {
-        Ok(_) => Ok(()),
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            Err(Failure::usage(format!("{}: exists: choose another, or add --force", out.display())))
-        }
-        Err(error) => Err(Failure::usage(error).context(out.display())),
-    }
 }
 
 fn tell(ticks: Option<(u64, u64)>, lost: u64, out: &Path) -> String {

@@ -1,5 +1,7 @@
-//! `mikoshi-in-process`: all services of a run in one thread. `mikoshi run --in-process` and
-//! `mikoshi replay` become it.
+//! `mikoshi-in-process`: all services of a run in one thread. `mikoshi run --in-process`,
+//! `mikoshi replay` and `mikoshi render` become it.
+
+mod render;
 
 use core::ops::ControlFlow;
 use mikoshi::arguments::{ReplayArguments, RunArguments};
@@ -23,7 +25,12 @@ use std::fs;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    mikoshi::main_of_in_process(&format!("MuJoCo {}", mujoco_version()), run_in_process, replay_in_process)
+    mikoshi::main_of_in_process(
+        &format!("MuJoCo {}", mujoco_version()),
+        run_in_process,
+        replay_in_process,
+        render::render,
+    )
 }
 
 fn replay_in_process(arguments: &ReplayArguments) -> Result<Status, Failure> {
