@@ -8,8 +8,9 @@ RELEASE := $(TARGET)/release
 PEERS := --release --manifest-path bench/peers/Cargo.toml --target-dir $(TARGET)
 COMMA := ,
 DDS = $(shell pkg-config --exists CycloneDDS && command -v idlc)
+ALL_PEERS = --features zenoh$(if $(DDS),$(COMMA)dds)
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench bench-parts peers lint
+.PHONY: help setup build demo test test-peers bench bench-parts peers lint
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -38,9 +39,13 @@ bench-parts: build ## Time the parts of a tick, kinematics beside Pinocchio's (w
 	@scripts/setup-pinocchio
 	MIKOSHI_PINOCCHIO="$(abspath $(TARGET))/pinocchio" $(CARGO) bench --workspace --bench parts
 
+test-peers: ## Test the other transports, too, that frames are compared over
+	$(if $(DDS),,@echo "peers: CycloneDDS is left out, since cyclonedds-dev, cyclonedds-tools or pkg-config is missing")
+	$(CARGO) test $(PEERS) $(ALL_PEERS)
+
 peers: ## Compare the exchange of frames with raw memory, iceoryx2, sockets, Zenoh, CycloneDDS
 	$(if $(DDS),,@echo "peers: CycloneDDS is left out, since cyclonedds-dev, cyclonedds-tools or pkg-config is missing")
-	$(CARGO) run $(PEERS) --features zenoh$(if $(DDS),$(COMMA)dds) -- compare --json $(TARGET)/peers.json
+	$(CARGO) run $(PEERS) $(ALL_PEERS) -- compare --json $(TARGET)/peers.json
 
 lint: setup ## Formatting, clippy, and dependency rules where cargo-deny is installed
 	$(CARGO) fmt --all --check
