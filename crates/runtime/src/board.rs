@@ -168,8 +168,10 @@ pub(crate) struct Slot {
     /// The board's generation whose processes it is connected to.
     welcomed: AtomicU32,
     progress: Progress,
-    /// Where its owner sleeps for what is not a frame, and whoever will be in charge, or was.
+    /// Where its owner sleeps alone.
     pub(crate) bed: Bed,
+    /// Where those sleep who will be in charge, or were: whoever calls the owner does not wake them.
+    pub(crate) porch: Bed,
     /// By phase: where others sleep until its owner has said what they wait for.
     lobbies: [Bed; LOBBIES],
     bells: [Bell; BELLS],
@@ -653,6 +655,7 @@ impl Board {
     pub(crate) fn wake_all(&self) {
         for slot in self.slots() {
             slot.bed.call_whoever_sleeps();
+            slot.porch.call_whoever_sleeps();
             slot.lobbies.iter().for_each(Bed::call_whoever_sleeps);
         }
     }

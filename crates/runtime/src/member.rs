@@ -172,7 +172,7 @@ impl Member {
         if slot.living_owner().is_some() {
             slot.ask_to_retire();
         }
-        self.wait_in_place(|| slot.living_owner().is_none())?;
+        self.wait_at_porch(|| slot.living_owner().is_none())?;
         Ok(None)
     }
 
@@ -203,8 +203,8 @@ impl Member {
         }
     }
 
-    /// Waits while it is not in charge.
-    fn wait_in_place(&self, is_over: impl Fn() -> bool) -> Result<(), TickError> {
+    /// Waits beside the bed that whoever is in charge sleeps in.
+    fn wait_at_porch(&self, is_over: impl Fn() -> bool) -> Result<(), TickError> {
         self.wait_beside(None, || Ok(is_over().then_some(()))).map(|_| ())
     }
 
@@ -213,7 +213,7 @@ impl Member {
         due_ns: Option<u64>,
         poll: impl Fn() -> Result<Option<()>, TickError>,
     ) -> Result<Option<()>, TickError> {
-        self.slot().bed.wait(self.policy, due_ns, poll, |_| match self.board.stop_is_requested() {
+        self.slot().porch.wait(self.policy, due_ns, poll, |_| match self.board.stop_is_requested() {
             true => Err(TickError::Stopped),
             false => Ok(()),
         })
@@ -227,7 +227,7 @@ impl Member {
     /// on its way.
     pub(crate) fn retire(&self) -> Result<(), TickError> {
         self.enter(State::Retired);
-        self.wait_in_place(|| !self.is_in_charge())
+        self.wait_at_porch(|| !self.is_in_charge())
     }
 
     /// What is to be done, at the latest in its next wait, when a process has taken another one's place.

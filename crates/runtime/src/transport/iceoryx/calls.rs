@@ -23,8 +23,8 @@ pub(super) struct Source {
 pub(super) struct Awaited {
     /// Frames of the publisher's phase that services wait for.
     frames: usize,
-    /// Whether there are some that only observers see.
-    others_follow: bool,
+    /// Whether to give way after the last of them, to those who wait, before what only observers see.
+    gives_way: bool,
     /// Who waits for more than this publisher.
     gatherings: Vec<Gathering>,
 }
@@ -56,7 +56,7 @@ impl Process {
 
     /// Says that a frame was sent. Those who sleep for what a phase says are woken by one call, after the last frame
     /// that a service waits for: each call is a system call, and the next ones would hold up those already awake.
-    /// What only observers see can wait until those had their turn.
+    /// In lockstep what only observers see can wait until those had their turn.
     pub(super) fn say(&self, source: Source, tick: u64, awaited: Option<&Awaited>) {
         let Some(slot) = self.slot_at(source) else { return };
         slot.bell(source.place).ring_for(tick);
@@ -68,7 +68,7 @@ impl Process {
             self.sent.set(self.sent.get() + 1);
             if self.sent.get() >= awaited.frames {
                 self.call_sleepers();
-                if awaited.others_follow {
+                if awaited.gives_way {
                     rustix::thread::sched_yield();
                 }
             }
@@ -94,8 +94,9 @@ impl Process {
         let mut phases = self.schedule.phases_of(self.schedule.producer_of(topic)?);
         let outputs = &phases.nth(source.phase)?.outputs;
         let frames = outputs.iter().filter(|output| is_awaited(output.topic)).count();
-        let others_follow = frames < outputs.len();
-        is_awaited(topic).then(|| Awaited { frames, others_follow, gatherings: self.gatherings_of(topic) })
+        // By the clock there is time, and whoever gives way may come back late.
+        let gives_way = frames < outputs.len() && self.schedule.clock() == Clock::Lockstep;
+        is_awaited(topic).then(|| Awaited { frames, gives_way, gatherings: self.gatherings_of(topic) })
     }
 
     /// The phases that wait for this topic and for other publishers.
