@@ -177,7 +177,7 @@ mod tests {
     fn woken_by(sleepers: usize, call: impl FnOnce(&Bed)) -> Vec<Woken> {
         let bed = Bed { ticket: AtomicU32::new(0), is_taken: AtomicU32::new(0) };
         let looks = AtomicU32::new(0);
-        let policy = WaitPolicy { yield_for: Duration::ZERO };
+        let policy = WaitPolicy { yield_for: Duration::ZERO, up_early: Duration::ZERO };
         std::thread::scope(|scope| {
             let sleeper = || {
                 let poll = || {

@@ -70,6 +70,9 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
     }
     let (figures, costs) = observer.measured();
     let summary = observer.finish(run, vec![]);
+    let is_lockstep = run.scenario.clock == Clock::Lockstep;
+    let spans = figures.spans();
+    let path_ns = result::critical_path_ns(&spans, run.robots.len(), machine.len());
     let result = LatencyResult {
         scenario: run.scenario.name.clone(),
         robots: run.robots.len(),
@@ -84,7 +87,8 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
         fifo_priority,
         load: arguments.load,
         ticks: figures.ticks(),
-        spans: figures.spans(),
+        spans,
+        critical_path_ns: path_ns.filter(|_| is_lockstep && !arguments.empty),
         late: lateness(&figures, &machine),
         late_ticks: figures.late().to_vec(),
         // Services that compute nothing don't say what they heard.

@@ -2,7 +2,7 @@
 
 use super::machine::CoreLateness;
 use crate::table;
-use mikoshi_observation::{LateTick, SpanSummary, WorstTick};
+use mikoshi_observation::{LateTick, Span, SpanSummary, WorstTick};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -25,6 +25,9 @@ pub struct LatencyResult {
     /// Ticks that were measured.
     pub ticks: u64,
     pub spans: Vec<SpanSummary>,
+    /// What a tick in lockstep can't be faster than on these cores, by the medians of its services.
+    #[serde(default)]
+    pub critical_path_ns: Option<u64>,
     pub late: Lateness,
     /// All of them.
     #[serde(default)]
@@ -91,6 +94,16 @@ impl LatencyResult {
     /// What it found, in sentences.
     pub fn findings(&self) -> Vec<String> {
         let mut findings = vec![];
+        if let (Some(path_ns), Some(tick_ns)) = (self.critical_path_ns, p50_ns(&self.spans, Span::Tick)) {
+            findings.push(format!(
+                "a tick takes {:.2} x the critical path of {} us on {} cores (physics, then the slower core's \
+                 share of control), and the run goes {:.1} x as fast as its clock",
+                tick_ns as f64 / path_ns as f64,
+                us(path_ns),
+                self.machine.len(),
+                self.control_period_s * 1e9 / tick_ns as f64,
+            ));
+        }
         if self.clock == "wall" {
             let Lateness { ticks, by_the_machine, by_us, by_nobody_knows } = self.late;
             findings.push(format!(
@@ -157,7 +170,41 @@ impl LatencyResult {
     }
 }
 
+/// Physics, the coordinator, and the servos that the slower of so many cores has, one after the other.
+pub fn critical_path_ns(spans: &[SpanSummary], robots: usize, cores: usize) -> Option<u64> {
+    let [step, coordinate, sense, act] =
+        [Span::Step, Span::Coordinate, Span::Sense, Span::Act].map(|span| p50_ns(spans, span));
+    let servos = robots.div_ceil(cores.max(1)) as u64;
+    Some(step? + coordinate? + servos * (sense? + act?))
+}
+
+fn p50_ns(spans: &[SpanSummary], span: Span) -> Option<u64> {
+    spans.iter().find(|summary| summary.span == span).map(|summary| summary.p50_ns)
+}
+
 /// Microseconds.
 pub fn us(ns: u64) -> String {
     format!("{:.1}", ns as f64 * 1e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mikoshi_observation::times_ns;
+
+    #[test]
+    fn the_critical_path_has_the_servos_of_the_slower_core() {
+        let of = |span, ns| {
+            let mut histogram = times_ns();
+            histogram.saturating_record(ns);
+            SpanSummary::of(span, &histogram)
+        };
+        let mut spans =
+            vec![of(Span::Step, 700), of(Span::Coordinate, 20), of(Span::Sense, 6), of(Span::Act, 24)];
+        assert_eq!(critical_path_ns(&spans, 4, 2), Some(700 + 20 + 2 * 30));
+        assert_eq!(critical_path_ns(&spans, 5, 2), Some(700 + 20 + 3 * 30));
+        assert_eq!(critical_path_ns(&spans, 4, 8), Some(700 + 20 + 30));
+        spans.pop();
+        assert_eq!(critical_path_ns(&spans, 4, 2), None);
+    }
 }
