@@ -25,7 +25,10 @@ impl Wait {
     /// The same, for Mikoshi's transport.
     pub fn policy(self) -> WaitPolicy {
         const FOR_EVER: Duration = Duration::from_secs(3600);
-        WaitPolicy { yield_for: if self == Self::Yielding { FOR_EVER } else { Duration::ZERO } }
+        WaitPolicy {
+            yield_for: if self == Self::Yielding { FOR_EVER } else { Duration::ZERO },
+            ..WaitPolicy::default()
+        }
     }
 
     /// Gives way until there is something.
