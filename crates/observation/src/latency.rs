@@ -325,10 +325,10 @@ fn last_stamp<P: Payload>(tick: &Observation, frames: &[Frame<P>]) -> u64 {
 
 /// For how long between these times some service but the bridge was at work on this tick.
 fn busy_ns(tick: &Observation, from_ns: u64, to_ns: u64) -> u64 {
-    let envelope = |frame: &Envelope| (frame.heard_ns.max(from_ns), frame.stamp_ns.min(to_ns));
-    let states = tick.robot_state.iter().map(|frame| envelope(&frame.envelope));
-    let commands = tick.joint_command.iter().map(|frame| envelope(&frame.envelope));
-    let mut times: Vec<_> = states.chain(commands).chain([envelope(&tick.team_state.envelope)]).collect();
+    let work = |phase: &Envelope| (phase.heard_ns.max(from_ns), phase.stamp_ns.min(to_ns));
+    let states = tick.robot_state.iter().map(|frame| work(&frame.envelope));
+    let commands = tick.joint_command.iter().map(|frame| work(&frame.envelope));
+    let mut times: Vec<_> = states.chain(commands).chain([work(&tick.team_state.envelope)]).collect();
     times.sort_unstable();
     let mut until_ns = from_ns;
     times.into_iter().fold(0, |busy_ns, (begin_ns, end_ns)| {

@@ -17,6 +17,11 @@ pub fn vector(v: &nalgebra::Vector3<f64>) -> Vector3 {
     Vector3 { x: v.x, y: v.y, z: v.z }
 }
 
+/// Three numbers of a twist or a wrench as it travels, from this one on: 0 or 3.
+pub fn half(six: &[f64; 6], first: usize) -> Vector3 {
+    Vector3 { x: six[first], y: six[first + 1], z: six[first + 2] }
+}
+
 pub fn point(v: &nalgebra::Vector3<f64>) -> Point3 {
     Point3 { x: v.x, y: v.y, z: v.z }
 }

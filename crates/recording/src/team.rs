@@ -1,6 +1,6 @@
 //! `/team/internal_forces` and `/team/state`: what the coordinator controls.
 
-use crate::convert::{timestamp, vector};
+use crate::convert::{half, timestamp, vector};
 use crate::topic::Topic;
 use foxglove::messages::{Timestamp, Vector3};
 use mikoshi_ipc_types::{mode, stop_cause};
@@ -89,10 +89,10 @@ impl Team {
                 name: name.clone(),
                 force_n: vector(&actual.force),
                 torque_nm: vector(&actual.moment),
-                force_measured_n: part(measured, 0),
-                torque_measured_nm: part(measured, 3),
-                force_ref_n: part(reference, 0),
-                torque_ref_nm: part(reference, 3),
+                force_measured_n: half(measured, 0),
+                torque_measured_nm: half(measured, 3),
+                force_ref_n: half(reference, 0),
+                torque_ref_nm: half(reference, 3),
             }
         };
         InternalForces { timestamp: timestamp(time_ns), rows: rows.map(row).collect() }
@@ -111,13 +111,9 @@ fn state_of(time_ns: u64, observation: &Observation, object: &TrackedObject) -> 
         speed_share: team.speed_share,
         object_error_m: vector(&error.linear),
         object_error_rad: vector(&error.angular),
-        object_velocity_m_s: part(twist, 0),
-        object_angular_velocity_rad_s: part(twist, 3),
+        object_velocity_m_s: half(twist, 0),
+        object_angular_velocity_rad_s: half(twist, 3),
         slip_max: team.hand_slip.iter().copied().fold(0.0, f64::max),
         absent_hands: team.absent_hands,
     }
-}
-
-fn part(six: &[f64; 6], first: usize) -> Vector3 {
-    Vector3 { x: six[first], y: six[first + 1], z: six[first + 2] }
 }

@@ -1,6 +1,6 @@
 //! `/robot/NAME/wrench/…`: what hands apply to the object, and what feet feel.
 
-use crate::convert::{timestamp, vector};
+use crate::convert::{half, timestamp};
 use crate::frames::{WORLD, of_link};
 use crate::topic::Topic;
 use foxglove::messages::{Timestamp, Vector3};
@@ -18,12 +18,12 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    fn new(time_ns: u64, frame_id: &str, [fx, fy, fz, nx, ny, nz]: [f64; 6]) -> Self {
+    fn new(time_ns: u64, frame_id: &str, wrench: &[f64; 6]) -> Self {
         Self {
             timestamp: timestamp(time_ns),
             frame_id: frame_id.to_owned(),
-            force_n: vector(&nalgebra::Vector3::new(fx, fy, fz)),
-            torque_nm: vector(&nalgebra::Vector3::new(nx, ny, nz)),
+            force_n: half(wrench, 0),
+            torque_nm: half(wrench, 3),
         }
     }
 }
@@ -63,12 +63,12 @@ impl Wrenches {
         let measured = observation.robot_state[self.robot].payload.hand_wrench;
         let actual = observation.robot_truth[self.robot].payload.hand_wrench;
         for ((topics, measured), actual) in self.hands.iter().zip(measured).zip(actual) {
-            topics.0.write(log, tick, &Wrench::new(time_ns, &self.odometry, measured))?;
-            topics.1.write(log, tick, &Wrench::new(time_ns, WORLD, actual))?;
+            topics.0.write(log, tick, &Wrench::new(time_ns, &self.odometry, &measured))?;
+            topics.1.write(log, tick, &Wrench::new(time_ns, WORLD, &actual))?;
         }
         let ankles = observation.sensors[self.robot].payload.ankle_wrench;
         for ((topic, sensor), wrench) in self.feet.iter().zip(ankles) {
-            topic.write(log, tick, &Wrench::new(time_ns, sensor, wrench))?;
+            topic.write(log, tick, &Wrench::new(time_ns, sensor, &wrench))?;
         }
         Ok(())
     }
