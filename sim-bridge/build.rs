@@ -21,6 +21,8 @@ fn main() {
         );
         return;
     }
+    // Where it is installed comes first: an installed program forgets the others.
+    println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/../lib/mikoshi");
     println!("cargo::rustc-link-arg=-Wl,-rpath,{directory}");
     // For a checkout that was moved after it was built, seen from target/release.
     println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/../../.mujoco/run-make-setup");

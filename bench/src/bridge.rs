@@ -4,6 +4,7 @@ use crate::recording::{Recording, WALKING};
 use crate::rounds::{Comparison, Spread, time_us};
 use bytemuck::Zeroable;
 use mikoshi_ipc_types::{JointCommand, ObjectTruth, RobotTruth, Sensors};
+use mikoshi_physics::Physics as _;
 use mikoshi_robot::Robot;
 use mikoshi_sim_bridge::{World, world_xml};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState};

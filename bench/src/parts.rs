@@ -180,7 +180,9 @@ fn gait() -> Spread {
         hand_centre: Some(robot.centre),
         foot_force: PerFoot { right: 550.0, left: 0.0 },
         soles: None,
+        sole_heights: None,
         load: ExternalLoad::NONE,
+        divergent_component: None,
     };
     measure(&mut |_, count| {
         for _ in 0..count {

@@ -91,9 +91,16 @@ pub struct DriveConfig {
     pub armature_kg_m2: f64,
 }
 
+impl RobotConfig {
+    /// The drive of this joint, if it has one.
+    pub fn drive_of(&self, joint: &str) -> Option<&DriveConfig> {
+        self.drives.iter().find(|drive| drive.is_for(joint))
+    }
+}
+
 impl DriveConfig {
     /// Whether it drives this joint, if no drive before it does.
-    pub fn is_for(&self, joint: &str) -> bool {
+    fn is_for(&self, joint: &str) -> bool {
         match self.joints.split_once('*') {
             None => self.joints == joint,
             Some((head, tail)) => {

@@ -2,9 +2,12 @@
 
 pub use crate::coordination::{Coordination, Policy};
 pub use crate::grasp::Grasp;
+pub use crate::hosts::{Host, Link};
 pub use crate::job::Job;
 pub use crate::motion::{Motion, RandomMotion, Segment};
-pub use crate::world::{FixedBox, GraspFailure, GraspFailureKind, World};
+pub use crate::operator::{DriveLimits, Operator, OperatorEvent, OperatorWord, Squeeze};
+pub use crate::sharing::LoadSharing;
+pub use crate::world::{FixedBox, GraspFailure, GraspFailureKind, Ground, LoadChange, PushEvent, World};
 use serde::{Deserialize, Serialize};
 
 /// One run, as `config/scenarios/*.toml` describe it. The team's file lies underneath: what the
@@ -29,6 +32,10 @@ pub struct Scenario {
     /// What makes a tick begin.
     #[serde(default)]
     pub clock: Clock,
+    /// In wall-clock time: how many seconds go by in one of the simulation's, where a machine is too slow for its
+    /// world.
+    #[serde(default = "real_time")]
+    pub slow_motion: f64,
     /// Age in ticks of the team command that a servo uses; in wall-clock time at least 1.
     #[serde(default)]
     pub coordination_delay_ticks: u64,
@@ -43,6 +50,9 @@ pub struct Scenario {
     /// Who decides where the hands go.
     #[serde(default)]
     pub coordination: Coordination,
+    /// Who bears how much of the object.
+    #[serde(default)]
+    pub load: LoadSharing,
     /// The whole job, from open hands to open hands; without, hands hold the object from tick 0 on.
     #[serde(default)]
     pub job: Option<Job>,
@@ -79,12 +89,26 @@ pub struct Scenario {
     /// What stops the team.
     #[serde(default)]
     pub safety: Safety,
+    /// What an operator may ask for, and what is asked by script.
+    #[serde(default)]
+    pub operator: Operator,
+    /// The computers of the team; none where one is enough.
+    #[serde(default)]
+    pub hosts: Vec<Host>,
+    /// How frames travel between them.
+    #[serde(default)]
+    pub link: Link,
 }
 
 impl Scenario {
     /// Number of control ticks.
     pub fn ticks(&self) -> u64 {
         (self.duration_s / self.control_period_s).round() as u64
+    }
+
+    /// What a tick takes by the clock.
+    pub fn wall_period_s(&self) -> f64 {
+        self.control_period_s * self.slow_motion
     }
 
     /// The least age of a team command: by the clock, robots don't wait for the coordinator.
@@ -107,6 +131,29 @@ impl Scenario {
         self.hybrid.start_s.is_some() || self.job.is_some()
     }
 
+    /// What a push on this body is called on the wire: the object, or a robot; `None` if there is no such body.
+    pub fn push_target(&self, on: &str) -> Option<u64> {
+        if on == PushEvent::OBJECT {
+            return Some(0);
+        }
+        self.robots.iter().position(|member| member.name == on).map(|robot| robot as u64 + 1)
+    }
+
+    /// Whether the object moves as whoever drives wants it.
+    pub fn is_driven(&self) -> bool {
+        self.operator.drive.is_some()
+    }
+
+    /// How fast the object loses velocity and angular velocity when it is to rest \[m/s², rad/s²\]; `None` where
+    /// nothing but a job moves it.
+    pub fn object_braking(&self) -> Option<[f64; 2]> {
+        let driven = self.operator.drive.as_ref();
+        let moved = self.motion.as_ref();
+        driven
+            .map(|drive| [drive.braking_m_s2, drive.angular_braking_rad_s2])
+            .or(moved.map(|motion| [motion.acceleration_m_s2, motion.angular_acceleration_rad_s2]))
+    }
+
     /// Whether hands hold the object at tick 0.
     pub fn begins_closed(&self) -> bool {
         self.job.is_none()
@@ -116,6 +163,10 @@ impl Scenario {
     pub fn substeps(&self) -> u64 {
         (self.control_period_s / self.physics.step_s).round() as u64
     }
+}
+
+fn real_time() -> f64 {
+    1.0
 }
 
 /// What makes a tick begin.
@@ -142,6 +193,9 @@ pub struct Object {
     /// Heading at the start.
     #[serde(default)]
     pub yaw_deg: f64,
+    /// Centre of mass, from the centre of the box.
+    #[serde(default)]
+    pub com_m: [f64; 3],
 }
 
 /// A robot of the team, and where it stands.
@@ -223,11 +277,13 @@ pub struct Balance {
     /// Whether feet give way to what the centre of mass and the ground do; without, the gait's
     /// references are followed as they are.
     pub stabiliser: bool,
+    /// Whether a robot that is off balance moves its foothold, and has the team land sooner, while a foot is in the air.
+    pub adjusts_steps: bool,
 }
 
 impl Default for Balance {
     fn default() -> Self {
-        Self { stabiliser: true }
+        Self { stabiliser: true, adjusts_steps: true }
     }
 }
 
@@ -349,6 +405,11 @@ pub struct Thresholds {
     pub axis_reference_error_end_n: Option<f64>,
     pub axis_reference_error_end_nm: Option<f64>,
     pub internal_peak_n: Option<f64>,
+    /// How far internal forces may be from their references, from 3 s after the law's start on.
+    pub internal_error_peak_n: Option<f64>,
+    /// The same over the last 0.2 s.
+    pub internal_error_end_n: Option<f64>,
+    pub internal_error_end_nm: Option<f64>,
     pub object_position_rms_m: Option<f64>,
     pub object_position_peak_m: Option<f64>,
     pub object_attitude_rms_rad: Option<f64>,
@@ -384,6 +445,9 @@ pub struct Placement {
     /// How long before a tick is due whoever begins it gets up, and gives way to others from then on: a core that
     /// sleeps is woken up late. With 0 it is woken when the tick is due. By the clock only.
     pub early_us: u32,
+    /// When cores of the services are kept from falling asleep, by threads of the supervisor that run only while
+    /// nobody else wants to. Without pins, cores are those of the machine if it has no more than there are services.
+    pub keep_awake: KeepAwake,
     /// What to do about a right that a service asks for and doesn't have.
     pub rt: MissingRights,
 }
@@ -397,9 +461,23 @@ impl Default for Placement {
             fifo_priority: None,
             yield_us: 20,
             early_us: 100,
+            keep_awake: KeepAwake::default(),
             rt: MissingRights::default(),
         }
     }
+}
+
+/// When cores are kept awake.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum KeepAwake {
+    /// They may sleep.
+    Never,
+    /// In lockstep: it is over the sooner.
+    #[default]
+    Lockstep,
+    /// By the clock, too.
+    Always,
 }
 
 /// What to do about a core, a priority or locked memory that is not granted.
@@ -457,8 +535,6 @@ pub struct Safety {
     pub slip_ticks: u64,
     /// What becomes of the team when a hand has lost the object.
     pub lost_grasp: LostGrasp,
-    /// What the operator says, and when.
-    pub operator: Vec<OperatorEvent>,
 }
 
 /// What becomes of a team one of whose hands has lost the object. Internal forces are formed anew among the others
@@ -471,26 +547,6 @@ pub enum LostGrasp {
     Stop,
     /// The other hands carry on, as long as they are hands of two robots.
     CarryOn,
-}
-
-/// The operator says something.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OperatorEvent {
-    /// When.
-    pub at_s: f64,
-    /// What.
-    pub says: OperatorWord,
-}
-
-/// What an operator can say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OperatorWord {
-    /// Stop the team.
-    Stop,
-    /// Go on after a safe stop.
-    Resume,
 }
 
 impl Default for Safety {
@@ -506,7 +562,6 @@ impl Default for Safety {
             slip_rad: 0.01,
             slip_ticks: 10,
             lost_grasp: LostGrasp::Stop,
-            operator: vec![],
         }
     }
 }

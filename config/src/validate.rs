@@ -1,6 +1,8 @@
 //! What types can't say: ranges, units that must fit each other, names that must agree.
 
 mod checks;
+mod hosts;
+mod operator;
 mod robot;
 mod scenario;
 mod sweep;

@@ -129,7 +129,7 @@ fn unknown_keys_are_rejected_everywhere() {
         TEAM,
         "mass_kg",
         "weight",
-        "teams/pair.toml:2: object.weight: unknown key, expected one of mass_kg, size_m, position_m, yaw_deg",
+        "teams/pair.toml:2: object.weight: unknown key, expected one of mass_kg, size_m, position_m, yaw_deg, com_m",
     );
     file_gives(
         TEAM,
@@ -664,4 +664,49 @@ fn a_team_whose_internal_forces_are_not_formed_anew_does_not_carry_on() {
     let options = ["safety.lost_grasp=carry-on", "hybrid.internal_forces=chain"];
     let text = text_of(root.path(), load(root.path(), &options));
     assert!(text.contains("safety.lost_grasp") && text.contains("balanced tree"), "{text}");
+}
+
+#[test]
+fn whoever_drives_can_be_stopped_in_time_and_is_alone() {
+    let drive = |keys: &str| format!("operator.drive={{{keys}}}");
+    let says = |options: &[&str]| text_of(&original(), load(&original(), options));
+    let hasty = says(&[&drive("timeout_s = 0.3")]);
+    assert!(hasty.contains("operator.drive.timeout_s: found 0.3, expected at least 0.15 s more"), "{hasty}");
+    for (keys, expected) in [
+        ("braking_m_s2 = 0.0", "operator.drive.braking_m_s2: found 0, expected more than 0"),
+        (
+            "velocity_max_m_s = 3.0",
+            "operator.drive.velocity_max_m_s: found 3, expected more than 0, at most 0.5",
+        ),
+        ("squeeze = {row = \"L\", axis = \"x\", max_n = 1e3}", "operator.drive.squeeze.max_n: found 1000"),
+        ("squeeze = {row = \"L\", axis = \"yaw\", max_n = 9.0}", "operator.drive.squeeze.axis"),
+    ] {
+        let text = says(&[&drive(keys)]);
+        assert!(text.contains(expected), "{text}");
+    }
+    let both = says(&[&drive(""), "motion={start_s = 1.0}"]);
+    assert!(both.contains("motion: found one, expected none"), "{both}");
+    let nobody = says(&["operator.script=[{at_s = 1.0, says = \"lift\"}]"]);
+    assert!(nobody.contains("operator.script.0.says: found lift, expected stop or resume"), "{nobody}");
+    let still = says(&["operator.script=[{at_s = 1.0, says = \"stop\", squeeze_n = 3.0}]"]);
+    assert!(still.contains("operator.script.0: found velocities or a squeeze"), "{still}");
+}
+
+#[test]
+fn nothing_is_pushed_that_is_not_there_or_out_of_all_measure() {
+    let says = |push: &str| {
+        let option = format!("world.pushes=[{{at_s = 1.0, {push}}}]");
+        text_of(&original(), load(&original(), &[&option]))
+    };
+    for (push, expected) in [
+        (
+            "for_s = 0.2, on = \"moon\", force_n = [0.0, 1.0, 0.0]",
+            "world.pushes.0.on: found \"moon\", expected object",
+        ),
+        ("for_s = 0.2, on = \"object\", force_n = [0.0, 1e6, 0.0]", "world.pushes.0.force_n"),
+        ("for_s = 60.0, on = \"object\", force_n = [0.0, 1.0, 0.0]", "world.pushes.0.for_s: found 60"),
+    ] {
+        let text = says(push);
+        assert!(text.contains(expected), "{text}");
+    }
 }

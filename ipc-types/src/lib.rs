@@ -16,6 +16,7 @@
 mod envelope;
 mod layout;
 mod limits;
+pub mod operator;
 mod payloads;
 mod service;
 
@@ -25,8 +26,9 @@ pub use limits::{
     FALLBACK_PARTS, MAX_COORDINATION_DELAY_TICKS, MAX_FEET, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_JOINTS,
     MAX_ROBOTS,
 };
+pub use operator::{Drive, OperatorInput, Push};
 pub use payloads::{
     JointCommand, ObjectTruth, PoseWire, RobotState, RobotTruth, Sensors, TeamCommand, TeamState, TwistWire,
-    WrenchWire, all_hands, flag, mode, operator, stop_cause,
+    WrenchWire, all_hands, flag, mode, stop_cause,
 };
 pub use service::ServiceId;

@@ -100,25 +100,6 @@ pub mod stop_cause {
     }
 }
 
-/// What an operator can say, as `TeamState::operator_word` carries it: the command in the lowest eight bits, a
-/// number that changes with every command above.
-pub mod operator {
-    /// Stop the team.
-    pub const STOP: u64 = 1;
-    /// Go on after a safe stop.
-    pub const RESUME: u64 = 2;
-
-    /// The word that says this after `last`.
-    pub const fn word_after(last: u64, command: u64) -> u64 {
-        ((last >> 8).wrapping_add(1) << 8) | (command & 0xff)
-    }
-
-    /// What a word says.
-    pub const fn command_of(word: u64) -> u64 {
-        word & 0xff
-    }
-}
-
 /// The first `count` hands, as sets of hands travel: bit h for grasping hand h.
 pub const fn all_hands(count: usize) -> u64 {
     let count = if count < MAX_HANDS { count } else { MAX_HANDS };
@@ -212,6 +193,15 @@ payload! {
         pub flags: u64,
         /// One past the tick of the last sensor readings that have arrived; 0 before the first.
         pub next_sensors_tick: u64,
+        /// Force with which its hands could lift, as it stands, before a joint had all that it can bear for long; 0 where
+        /// nobody has said.
+        pub bearable_n: f64,
+        /// Largest torque that a joint needs to stand so and to bear what its hands are expected to, as a share of its limit.
+        pub static_torque_share: f64,
+        /// Moment that its hands together would best apply to the object beside that force, in world axes.
+        pub bearing_moment_nm: [f64; 3],
+        /// In how many ticks its swinging foot, or its first one, had better have landed; 0: as the step clock has it.
+        pub land_in_ticks: u64,
     }
 }
 
@@ -294,6 +284,34 @@ payload! {
         pub absent_hands: u64,
         /// Why the last of them was lost: one of [`stop_cause`], 0 if none was.
         pub loss_cause: u64,
+        /// Number of the message in which whoever drives has said the following; 0 if nobody ever drove.
+        pub drive_number: u64,
+        /// Twist of the object that it asks for, in the object's heading.
+        pub drive_twist: TwistWire,
+        /// How much harder the hands shall press than they would.
+        pub drive_squeeze_n: f64,
+        /// For how many ticks whoever drives has said nothing new.
+        pub drive_silent_ticks: u64,
+        /// How much harder they are asked to press by now.
+        pub squeeze_n: f64,
+        /// The word that the job waits for: one of [`operator`](crate::operator), 0 if none.
+        pub awaited_word: u64,
+        /// What is carried, as hands feel it: mass, 0 as long as nobody knows.
+        pub load_mass_kg: f64,
+        /// Standard deviation of the mass.
+        pub load_mass_std_kg: f64,
+        /// Its centre of mass from the object's origin, in the object's axes.
+        pub load_com_m: [f64; 3],
+        /// Standard deviation of the centre of mass.
+        pub load_com_std_m: [f64; 3],
+        /// Its inertia about the centre of mass, in the object's axes: xx, yy, zz, xy, xz, yz.
+        pub load_inertia_kg_m2: [f64; 6],
+        /// Standard deviation of the inertia.
+        pub load_inertia_std_kg_m2: [f64; 6],
+        /// Of the load, what each robot is asked to bear: 1 for all of it.
+        pub load_share: [f64; MAX_ROBOTS],
+        /// To which part hands are relieved of the moments that zero internal forces bring: 0 not at all, 1 wholly.
+        pub load_relief: f64,
     }
 }
 
@@ -315,6 +333,16 @@ payload! {
         pub unintended_pair: [u64; 2],
         /// Robots in the team, for readers of the log.
         pub robot_count: u64,
+        /// Force of pushes on it in the last tick, in the world.
+        pub push_force_n: [f64; 3],
+        /// Number of the last push that was heard of, in the tick before; 0 before the first.
+        pub heard_push_number: u64,
+        /// Whom it pushes: the object, or robot r for r + 1.
+        pub heard_push_target: u64,
+        /// How hard, in the world.
+        pub heard_push_force_n: [f64; 3],
+        /// For how long.
+        pub heard_push_ticks: u64,
     }
 }
 
@@ -349,6 +377,8 @@ payload! {
         pub tilt_rad: f64,
         /// 1 once the robot has fallen.
         pub fallen: u64,
+        /// Force of pushes on its base in the last tick, in the world.
+        pub push_force_n: [f64; 3],
     }
 }
 

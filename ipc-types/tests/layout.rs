@@ -83,13 +83,26 @@ fn sizes_follow_from_the_limits() {
     );
     assert_eq!(
         size_of::<TeamState>(),
-        word * ((2 * 6 + 1) * MAX_HANDS_OF_TEAM + 2 * 7 + 6 + 1 + 4 + 1 + 3 + (1 + 7) * MAX_ROBOTS + 2),
-        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, tick and frame by robot, slip by hand, lost hands and why"
+        word * ((2 * 6 + 1) * MAX_HANDS_OF_TEAM
+            + 2 * 7
+            + 6
+            + 1
+            + 4
+            + 1
+            + 3
+            + (1 + 7) * MAX_ROBOTS
+            + 2
+            + 8
+            + 3
+            + 2 * (1 + 3 + 6)
+            + MAX_ROBOTS
+            + 1),
+        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, tick and frame by robot, slip by hand, lost hands and why, what was said last by whoever drives, silence, squeeze, awaited word, mass, centre and inertia of the load with their deviations, share by robot, relief"
     );
     assert_eq!(
         size_of::<ObjectTruth>(),
-        word * (7 + 6 + 6 + 1 + 2 + 1),
-        "pose, twist, support, contacts, their first pair, robots"
+        word * (7 + 6 + 6 + 1 + 2 + 1 + 3 + 6),
+        "pose, twist, support, contacts, their first pair, robots, push, the last push that was heard of"
     );
 }
 

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{constant_commands, standing_team};
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::World;
 
 fn main() {

@@ -1,13 +1,14 @@
 //! Where the simulator keeps what the frames need: addresses, found once by name.
 
-use crate::BuildWorldError;
 use crate::grasp::GraspSite;
-use crate::mjcf::{self, FLOOR, OBJECT, fixed_box, qualified};
+use crate::mjcf::{self, FLOOR, OBJECT, fixed_box, ground_prefix, qualified};
+use crate::rejects;
 use crate::robot::Robot;
 use mikoshi_config::scenario::FixedBox;
 use mikoshi_humanoid::balance::PerFoot;
 use mikoshi_humanoid::estimate::SoleRectangle;
 use mikoshi_humanoid::model::FrameId;
+use mikoshi_physics::{BuildWorldError, GRAVITY_M_S2, Standing};
 use mikoshi_spatial::{Hand, Object, Pose};
 use mujoco_rs::prelude::{MjModel, MjtObjBase};
 
@@ -30,13 +31,11 @@ pub struct BodyLayout {
 /// One robot's addresses.
 pub struct RobotLayout {
     pub base: BodyLayout,
-    pub weight_n: f64,
-    pub initial_base_height_m: f64,
     pub joints: Vec<JointLayout>,
     /// Grasping hands.
     pub hands: Vec<HandLayout>,
     pub feet: Vec<FootLayout>,
-    pub soles: PerFoot<SoleRectangle>,
+    pub standing: Standing,
     /// In the sensor data.
     pub gyro: usize,
     /// In the sensor data.
@@ -120,9 +119,7 @@ struct Finder<'a>(&'a MjModel);
 
 impl Finder<'_> {
     fn id(&self, kind: MjtObjBase, name: &str) -> Result<usize, BuildWorldError> {
-        self.0
-            .name_to_id(kind, name)
-            .ok_or_else(|| BuildWorldError::Simulator(format!("no '{name}' among the {kind:?}")))
+        self.0.name_to_id(kind, name).ok_or_else(|| rejects(format!("no '{name}' among the {kind:?}")))
     }
 
     fn body(&self, name: &str) -> Result<BodyLayout, BuildWorldError> {
@@ -190,12 +187,14 @@ impl Finder<'_> {
         let [gyro, accelerometer] = self.sensor_pair(imu)?;
         Ok(RobotLayout {
             base: self.body(&qualified(robot.name(), &model.bodies()[0].name))?,
-            weight_n: model.total_mass_kg() * crate::GRAVITY_M_S2,
-            initial_base_height_m: robot.spec.initial_base_pose[2],
             joints: joints.collect::<Result<_, BuildWorldError>>()?,
             hands: hands.collect::<Result<_, BuildWorldError>>()?,
             feet: feet.collect::<Result<_, BuildWorldError>>()?,
-            soles: PerFoot::from_fn(sole),
+            standing: Standing {
+                soles: PerFoot::from_fn(sole),
+                weight_n: model.total_mass_kg() * GRAVITY_M_S2,
+                initial_base_height_m: robot.spec.initial_base_pose[2],
+            },
             gyro,
             accelerometer,
         })
@@ -213,7 +212,7 @@ impl Finder<'_> {
             return Ok(GeomOwner::Object);
         }
         let name = self.0.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
-        if name == FLOOR {
+        if name == FLOOR || name.starts_with(&ground_prefix()) {
             return Ok(GeomOwner::Floor);
         }
         if boxes.iter().any(|fixed| fixed_box(&fixed.name) == name) {
@@ -234,6 +233,6 @@ impl Finder<'_> {
                 });
             }
         }
-        Err(BuildWorldError::Simulator(format!("geom '{name}' is nobody's")))
+        Err(rejects(format!("geom '{name}' is nobody's")))
     }
 }

@@ -14,29 +14,29 @@
 
 #![allow(non_snake_case)] // Monogram names, as in the crates of mathematics.
 
-mod coast;
-mod error;
 mod failures;
-mod fallback;
 mod grasp;
 mod grip;
 mod layout;
 mod logging;
 mod mjcf;
-mod participant;
-mod plan;
+mod object_body;
 mod pose;
-mod random;
+mod pushes;
 mod readings;
 mod robot;
 mod tally;
 mod truth;
 mod world;
 
-pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
 pub use mjcf::{MAX_PICTURE_HEIGHT, MAX_PICTURE_WIDTH, OBJECT, qualified};
-pub use participant::{BridgeParticipant, BuildBridgeError};
 pub use world::{World, world_xml};
 
-/// Standard gravity as the simulated world has it.
-pub const GRAVITY_M_S2: f64 = 9.81;
+use mikoshi_physics::BuildWorldError;
+
+const ENGINE: &str = "MuJoCo";
+
+/// The simulator's own objection.
+fn rejects(what: impl ToString) -> BuildWorldError {
+    BuildWorldError::Simulator { engine: ENGINE, what: what.to_string() }
+}

@@ -2,10 +2,11 @@
 
 use clap::Parser;
 use mikoshi_ipc_types::ServiceId;
+use mikoshi_physics::BridgeParticipant;
 use mikoshi_process::{ServeError, ServiceArguments, serve};
 use mikoshi_resolution::write_world;
 use mikoshi_runtime::CountingAllocator;
-use mikoshi_sim_bridge::{BridgeParticipant, world_xml};
+use mikoshi_sim_bridge::{World, world_xml};
 use std::process::ExitCode;
 
 #[global_allocator]
@@ -20,7 +21,7 @@ fn main() -> ExitCode {
             // Before the simulator sees it: if it rejects the world, one wants to look at it.
             let xml = world_xml(run).map_err(ServeError::configuration)?;
             write_world(place.run(), &xml).map_err(ServeError::fault)?;
-            BridgeParticipant::new(run, transport).map_err(|error| match error.is_fault() {
+            BridgeParticipant::<_, World>::new(run, transport).map_err(|error| match error.is_fault() {
                 true => ServeError::fault(error),
                 false => ServeError::configuration(error),
             })

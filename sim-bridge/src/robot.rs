@@ -1,11 +1,11 @@
 //! A robot of the run with every name of its configuration found in its description.
 
-use crate::BuildWorldError;
 use mikoshi_config::RobotSpec;
 use mikoshi_config::robot::DriveConfig;
 use mikoshi_humanoid::estimate::ForceTorqueSensor;
 use mikoshi_humanoid::model::{FrameId, Model};
 use mikoshi_ipc_types::{MAX_HANDS, MAX_JOINTS};
+use mikoshi_physics::BuildWorldError;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// A palm or a sole, and the force/torque sensor that carries it.
@@ -44,9 +44,8 @@ impl<'a> Robot<'a> {
             |(frame, sensor): (FrameId, ForceTorqueSensor)| Extremity { frame, sensor: sensor.frame };
         let hands: Vec<_> = palms.into_iter().zip(wrist_sensors).map(extremity).collect();
         let feet = soles.into_array().into_iter().zip(ankle_sensors.into_array()).map(extremity).collect();
-        let drive = |joint: &str| config.drives.iter().find(|drive| drive.is_for(joint));
         let drives = model.joints().iter().map(|joint| {
-            drive(&joint.name).ok_or_else(|| BuildWorldError::NoDrive {
+            config.drive_of(&joint.name).ok_or_else(|| BuildWorldError::NoDrive {
                 robot: spec.member.name.clone(),
                 joint: joint.name.clone(),
             })

@@ -108,6 +108,12 @@ pub fn count_contacts(
                     contact_wrench(data, index, contact).shifted(&Vector3::from(contact.pos));
                 continue;
             }
+            // Slabs of the ground are boxes like soles, of which either may come first.
+            [GeomOwner::Foot { robot, foot }, GeomOwner::Floor] => {
+                tallies[robot].ground_sum[foot] +=
+                    -contact_wrench(data, index, contact).shifted(&Vector3::from(contact.pos));
+                continue;
+            }
             [GeomOwner::FixedBox, GeomOwner::Object] | [GeomOwner::Object, GeomOwner::FixedBox] => {
                 let on_second = contact_wrench(data, index, contact);
                 let on_object = if owners[1] == GeomOwner::Object { on_second } else { -on_second };
@@ -115,7 +121,9 @@ pub fn count_contacts(
                 contacts.support_sum += on_object.shifted(&(Vector3::from(contact.pos) - origin));
                 continue;
             }
-            [GeomOwner::Floor, GeomOwner::Part { robot }] => tallies[robot].is_on_the_floor = true,
+            [GeomOwner::Floor, GeomOwner::Part { robot }] | [GeomOwner::Part { robot }, GeomOwner::Floor] => {
+                tallies[robot].is_on_the_floor = true
+            }
             _ => {}
         }
         unintended += 1;

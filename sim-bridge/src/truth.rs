@@ -4,20 +4,11 @@ use crate::layout::{BodyLayout, HandLayout, Layout, RobotLayout};
 use crate::pose::{body_pose, body_twist, site_pose};
 use crate::tally::{Contacts, Tally};
 use mikoshi_humanoid::balance::PerFoot;
-use mikoshi_humanoid::estimate::{self, SupportPolygon};
 use mikoshi_ipc_types::{MAX_HANDS, ObjectTruth, RobotTruth};
-use mikoshi_spatial::{Base, Foot, Hand, Object, World, Wrench};
+use mikoshi_physics::Stance;
+use mikoshi_spatial::{Base, Hand, Object, World, Wrench};
 use mujoco_rs::prelude::{MjData, MjModel, MjtConstraint};
-use nalgebra::{Vector2, Vector3};
-
-/// Share of its weight that a foot must bear to count as a support.
-const BEARING_SHARE: f64 = 0.05;
-/// Margin of a robot that nothing supports: finite, as everything that travels.
-const NO_SUPPORT_M: f64 = -1.0;
-/// A robot whose base is tilted further has fallen.
-const FALLEN_TILT_RAD: f64 = 0.6;
-/// A robot whose base is lower than this share of its height at tick 0 has fallen.
-const FALLEN_HEIGHT_SHARE: f64 = 0.5;
+use nalgebra::Vector3;
 
 /// The robot of now, and what happened to it in the last tick. `truth.fallen` stays set.
 pub fn of_robot(
@@ -28,7 +19,6 @@ pub fn of_robot(
     truth: &mut RobotTruth,
 ) {
     let X_WB = body_pose::<Base>(data, &layout.base);
-    truth.base_pose = X_WB.to_array();
     for (index, joint) in layout.joints.iter().enumerate() {
         truth.joint_position_rad[index] = data.qpos()[joint.qpos];
     }
@@ -38,42 +28,15 @@ pub fn of_robot(
         truth.hand_pose[index] = site_pose::<Hand>(data, hand.palm_site).to_array();
         truth.hand_wrench[index] = hand_wrenches[index].to_array();
     }
-    for (index, foot) in layout.feet.iter().enumerate() {
-        truth.sole_pose[index] = site_pose::<Foot>(data, foot.sole_site).to_array();
-        truth.ground_wrench[index] = tally.mean_ground_wrench(index).to_array();
-    }
-    let com = data.subtree_com()[layout.base.body];
-    truth.com_position_m = com;
-    let (zmp, margin) = zero_moment_point(data, layout, tally, &com);
-    truth.zmp_position_m = zmp.into();
-    truth.zmp_margin_m = margin;
-    truth.tilt_rad = (X_WB.rotation * Vector3::z()).angle(&Vector3::z());
-    let has_fallen = truth.tilt_rad > FALLEN_TILT_RAD
-        || X_WB.translation.z < FALLEN_HEIGHT_SHARE * layout.initial_base_height_m
-        || tally.is_on_the_floor;
-    truth.fallen |= u64::from(has_fallen);
-}
-
-/// Centre of pressure of all ground contact on z = 0, and its distance from the edge of the hull of the
-/// feet that bear. Where none bears, the ground point below the centre of mass, and −1 m.
-fn zero_moment_point(
-    data: &MjData<Box<MjModel>>,
-    layout: &RobotLayout,
-    tally: &Tally,
-    com: &[f64; 3],
-) -> (Vector2<f64>, f64) {
-    let least_force_n = BEARING_SHARE * layout.weight_n;
-    let feet = || layout.feet.iter().enumerate();
-    let ground = feet().fold(Wrench::zero(), |sum, (foot, _)| sum + tally.mean_ground_wrench(foot));
-    let point = estimate::zero_moment_point(&ground, 0.0, least_force_n)
-        .unwrap_or_else(|| Vector2::new(com[0], com[1]));
-    let standing = PerFoot::from_fn(|side| {
-        let (foot, layout) = feet().nth(side as usize)?;
-        let bears = tally.mean_ground_wrench(foot).force.z > least_force_n;
-        bears.then(|| site_pose(data, layout.sole_site))
-    });
-    let support = SupportPolygon::of_feet(&layout.soles, &standing);
-    (point, support.signed_distance(&point).max(NO_SUPPORT_M))
+    let feet = PerFoot::from_fn(|side| &layout.feet[side as usize]);
+    let stance = Stance {
+        base: X_WB,
+        soles: PerFoot::from_fn(|side| site_pose(data, feet[side].sole_site)),
+        ground: PerFoot::from_fn(|side| tally.mean_ground_wrench(side as usize)),
+        com_m: data.subtree_com()[layout.base.body].into(),
+        is_on_the_floor: tally.is_on_the_floor,
+    };
+    layout.standing.judge(&stance, truth);
 }
 
 /// The object of now, and what touched what in the last tick.

@@ -1,18 +1,25 @@
 //! The world of a run, tick by tick.
 
 use crate::failures::GraspFailures;
-use crate::grasp::{self, GraspSite, Spring};
+use crate::grasp::{self, GraspSite};
 use crate::grip;
-use crate::layout::Layout;
-use crate::readings::{self, Noise};
+use crate::layout::{HandLayout, Layout};
+use crate::object_body::ObjectBodies;
+use crate::pose::{site_pose, site_twist};
+use crate::pushes;
+use crate::readings;
 use crate::robot::Robot;
 use crate::tally::{self, Contacts, Tally};
 use crate::truth;
-use crate::{BuildWorldError, LoadWorldError, StepWorldError, logging, mjcf};
+use crate::{ENGINE, logging, mjcf, rejects};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, RobotTruth, Sensors, all_hands};
+use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, Push, RobotTruth, Sensors, all_hands};
+use mikoshi_physics::{
+    ActivePush, BuildWorldError, LoadWorldError, Noise, ObjectBody, Physics, PushScript, SensorCounts,
+    Spring, StepWorldError, are_active, begin, force_n,
+};
 use mikoshi_runtime::{read_parts, write_parts};
-use mikoshi_spatial::Wrench;
+use mikoshi_spatial::{Hand, Wrench};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjtState, MjtWarning};
 use nalgebra::Vector3;
 use xxhash_rust::xxh3::xxh3_64;
@@ -28,6 +35,8 @@ pub struct World {
     layout: Layout,
     spring: Option<Spring>,
     failures: GraspFailures,
+    push_script: PushScript,
+    bodies: ObjectBodies,
     noise: Vec<Option<Noise>>,
     substeps: u64,
     /// Readings that are kept for each robot: the delay in ticks, plus one.
@@ -49,6 +58,7 @@ struct State {
     readings: Box<[Sensors]>,
     robots: Box<[RobotTruth]>,
     object: ObjectTruth,
+    pushes: Box<[ActivePush]>,
 }
 
 /// Workspace: nothing in it matters after a tick.
@@ -74,7 +84,7 @@ impl<'a> Description<'a> {
         let robots = run.robots.iter().map(Robot::resolve).collect::<Result<Vec<_>, _>>()?;
         let grasps = grasp::sites(&run.scenario, &robots);
         let spring = Spring::of(&run.scenario, grasps.len())?;
-        let xml = mjcf::world(&run.scenario, &robots, &grasps);
+        let xml = mjcf::world(&run.scenario, &ObjectBody::of(&run.scenario.object), &robots, &grasps);
         Ok(Self { robots, grasps, spring, xml })
     }
 }
@@ -93,14 +103,16 @@ const SETTLING_S: f64 = 1.0;
 /// All that the simulator integrates, warm start included: without it a replay differs in the last bits.
 const INTEGRATION: u32 = MjtState::mjSTATE_INTEGRATION as u32;
 
-impl World {
+impl Physics for World {
+    const ENGINE: &'static str = ENGINE;
+
     /// The world at tick 0, with the hands on the object. It is put where the run says, and has come to
     /// rest there: soles have sunk in, drives have given way, grasps strain. That moves palms and object
     /// by millimetres.
     ///
     /// # Errors
     /// A run that no world can be built from; see [`BuildWorldError`].
-    pub fn new(run: &RunSpec) -> Result<Self, BuildWorldError> {
+    fn new(run: &RunSpec) -> Result<Self, BuildWorldError> {
         logging::install();
         let scenario = &run.scenario;
         let substeps = scenario.substeps();
@@ -115,15 +127,20 @@ impl World {
             });
         }
         let Description { robots, grasps, spring, xml } = Description::of(run)?;
-        let simulator = |error: &dyn core::fmt::Display| BuildWorldError::Simulator(error.to_string());
-        let model = MjModel::from_xml_string(&xml).map_err(|error| simulator(&error))?;
+        let model = MjModel::from_xml_string(&xml).map_err(rejects)?;
+        let bodies = ObjectBodies::new(run, |body| {
+            let xml = mjcf::world(scenario, body, &robots, &grasps);
+            MjModel::from_xml_string(&xml).map_err(rejects)
+        })?;
         let layout = Layout::of(&model, &scenario.world.boxes, &robots, &grasps)?;
         let noise = layout.robots.iter().enumerate().map(|(index, robot)| {
-            Noise::of(&scenario.sensors, scenario.seed, index, robot, scenario.control_period_s)
+            let counts =
+                SensorCounts { joints: robot.joints.len(), hands: robot.hands.len(), feet: robot.feet.len() };
+            Noise::of(&scenario.sensors, scenario.seed, index, counts, scenario.control_period_s)
         });
         let noise = noise.collect();
         let state_size = model.state_size(INTEGRATION);
-        let mut data = MjData::try_new(Box::new(model)).map_err(|error| simulator(&error))?;
+        let mut data = MjData::try_new(Box::new(model)).map_err(rejects)?;
 
         let closed_hands = |hands| if scenario.begins_closed() { all_hands(hands) } else { 0 };
         let mut commands = vec![bytemuck::Zeroable::zeroed(); robots.len()].into_boxed_slice();
@@ -145,6 +162,7 @@ impl World {
             readings: vec![bytemuck::Zeroable::zeroed(); robots.len() * depth].into(),
             robots: vec![bytemuck::Zeroable::zeroed(); robots.len()].into(),
             object: bytemuck::Zeroable::zeroed(),
+            pushes: vec![ActivePush::default(); robots.len() + 1].into(),
         };
         let scratch = Scratch {
             tallies: vec![Tally::empty(); robots.len()].into(),
@@ -155,10 +173,25 @@ impl World {
         };
         let fingerprint = xxh3_64(format!("{} {xml}", mujoco_rs::mujoco_version()).as_bytes());
         let failures = GraspFailures::default();
-        let mut world =
-            Self { data, layout, spring, failures, noise, substeps, depth, fingerprint, state, scratch };
+        let push_script = PushScript::default();
+        let mut world = Self {
+            data,
+            layout,
+            spring,
+            failures,
+            push_script,
+            bodies: ObjectBodies::default(),
+            noise,
+            substeps,
+            depth,
+            fingerprint,
+            state,
+            scratch,
+        };
         world.settle(scenario.physics.step_s)?;
         world.failures = GraspFailures::of(run);
+        world.push_script = PushScript::of(run);
+        world.bodies = bodies;
         // Readings from before tick 0 are those of tick 0.
         for ring in world.state.readings.chunks_exact_mut(depth) {
             let first = ring[0];
@@ -167,67 +200,50 @@ impl World {
         Ok(world)
     }
 
-    /// Number of robots.
-    pub fn robot_count(&self) -> usize {
+    fn robot_count(&self) -> usize {
         self.state.robots.len()
     }
 
-    /// Names the model and the simulator: worlds that have the same can load one another's checkpoints.
-    pub fn fingerprint(&self) -> u64 {
+    fn fingerprint(&self) -> u64 {
         self.fingerprint
     }
 
-    /// Lower and upper limit of every joint, by robot.
-    pub(crate) fn joint_limits(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    fn joint_limits(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
         let robots = self.layout.robots.iter();
         robots.map(|robot| robot.joints.iter().map(|joint| joint.limits).collect())
     }
 
-    /// The commands of the last tick.
-    pub fn commands(&self) -> &[JointCommand] {
+    fn commands(&self) -> &[JointCommand] {
         &self.state.commands
     }
 
-    /// Says in the next readings whose joint command could not be used: bit r for robot r.
-    pub fn note_rejected(&mut self, robots: u64) {
+    fn push(&mut self, push: &Push) {
+        begin(&mut self.state.pushes, push, self.state.tick);
+    }
+
+    fn note_rejected(&mut self, robots: u64) {
         self.scratch.rejected = robots;
     }
 
-    /// The tick that the world is at.
-    pub fn tick(&self) -> u64 {
+    fn tick(&self) -> u64 {
         self.state.tick
     }
 
-    /// The name of a geom: `ROBOT/LINK#INDEX`, `world/BOX`, `object` or `floor`.
-    pub fn geom_name(&self, geom: usize) -> Option<&str> {
-        let model = self.data.model();
-        (geom < model.ngeom() as usize).then(|| model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom))?
-    }
-
-    /// What robot `robot`'s sensors say at this tick.
-    pub fn sense(&self, robot: usize, sensors: &mut Sensors) {
+    fn sense(&self, robot: usize, sensors: &mut Sensors) {
         // Tick k lies at k mod depth; the oldest, `delay` = depth − 1 ticks ago, follows it.
         let oldest = (self.state.tick as usize + 1) % self.depth;
         *sensors = self.state.readings[robot * self.depth + oldest];
     }
 
-    /// Robot `robot` as it truly is.
-    pub fn robot_truth(&self, robot: usize, truth: &mut RobotTruth) {
+    fn robot_truth(&self, robot: usize, truth: &mut RobotTruth) {
         *truth = self.state.robots[robot];
     }
 
-    /// The object as it truly is.
-    pub fn object_truth(&self, truth: &mut ObjectTruth) {
+    fn object_truth(&self, truth: &mut ObjectTruth) {
         *truth = self.state.object;
     }
 
-    /// Advances by one tick. References run linearly from the last commands to these, and reach them
-    /// in the last physics step; the rates feed the drives' damping forward.
-    ///
-    /// # Errors
-    /// Commands that cannot be followed leave the world as it is. After a result that is not physics the
-    /// world must not be used any more, except to be loaded.
-    pub fn step(&mut self, commands: &[JointCommand]) -> Result<(), StepWorldError> {
+    fn step(&mut self, commands: &[JointCommand]) -> Result<(), StepWorldError> {
         if commands.len() != self.robot_count() {
             return Err(StepWorldError::CommandCount);
         }
@@ -236,14 +252,19 @@ impl World {
         if !values.into_iter().all(|value| value.is_finite()) {
             return Err(StepWorldError::NotFinite);
         }
-        let State { tick, holding, .. } = &mut self.state;
+        let State { tick, holding, pushes, .. } = &mut self.state;
+        if self.bodies.turn_to(*tick, &mut self.data) {
+            self.data.step1();
+        }
+        self.push_script.begin(pushes, *tick);
+        let is_pushed = are_active(pushes, *tick);
         grip::close_and_open(&mut self.data, &self.layout, commands, holding);
         self.failures.undo(*tick, &mut self.data, &self.layout, holding);
         self.scratch.tallies.fill(Tally::empty());
         self.scratch.contacts = Contacts::default();
         for substep in 1..=self.substeps {
             self.set_drives(commands, substep as f64 / self.substeps as f64);
-            self.pull();
+            self.pull(is_pushed);
             for (tally, layout) in self.scratch.tallies.iter_mut().zip(&self.layout.robots) {
                 tally.count_demands(&self.data, layout);
             }
@@ -260,15 +281,18 @@ impl World {
             self.data.step1();
             self.check()?;
         }
+        if is_pushed {
+            pushes::clear(&mut self.data, &self.layout);
+        }
+        self.note_pushes();
         self.state.commands.copy_from_slice(commands);
         self.state.tick += 1;
         self.observe();
         Ok(())
     }
 
-    /// Bytes of a checkpoint.
-    pub fn checkpoint_size(&self) -> usize {
-        let State { tick, commands, holding, readings, robots, object } = &self.state;
+    fn checkpoint_size(&self) -> usize {
+        let State { tick, commands, holding, readings, robots, object, pushes } = &self.state;
         size_of_val(&*self.scratch.simulator_state)
             + size_of_val(tick)
             + size_of_val(&**commands)
@@ -276,13 +300,10 @@ impl World {
             + size_of_val(&**readings)
             + size_of_val(&**robots)
             + size_of_val(object)
+            + size_of_val(&**pushes)
     }
 
-    /// Writes all that matters into the first [`checkpoint_size`](Self::checkpoint_size) bytes.
-    ///
-    /// # Errors
-    /// There are not as many bytes.
-    pub fn save(&mut self, checkpoint: &mut [u8]) -> Result<(), LoadWorldError> {
+    fn save(&mut self, checkpoint: &mut [u8]) -> Result<(), LoadWorldError> {
         self.check_size(checkpoint)?;
         self.data.read_state_into(INTEGRATION, &mut self.scratch.simulator_state);
         write_parts(self.state.parts(&mut self.scratch.simulator_state), checkpoint)
@@ -290,11 +311,7 @@ impl World {
             .map_err(|_| LoadWorldError { found: checkpoint.len(), expected: self.checkpoint_size() })
     }
 
-    /// Returns to a checkpoint of a world of the same run. What follows is the same to the last bit.
-    ///
-    /// # Errors
-    /// There are not as many bytes as a checkpoint of this world has.
-    pub fn load(&mut self, checkpoint: &[u8]) -> Result<(), LoadWorldError> {
+    fn load(&mut self, checkpoint: &[u8]) -> Result<(), LoadWorldError> {
         self.check_size(checkpoint)?;
         let rejected = LoadWorldError { found: checkpoint.len(), expected: self.checkpoint_size() };
         if read_parts(self.state.parts(&mut self.scratch.simulator_state), checkpoint).is_err()
@@ -302,8 +319,17 @@ impl World {
         {
             return Err(rejected);
         }
+        self.bodies.turn_to(self.state.tick, &mut self.data);
         self.data.step1();
         Ok(())
+    }
+}
+
+impl World {
+    /// The name of a geom: `ROBOT/LINK#INDEX`, `world/BOX`, `object` or `floor`.
+    pub fn geom_name(&self, geom: usize) -> Option<&str> {
+        let model = self.data.model();
+        (geom < model.ngeom() as usize).then(|| model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom))?
     }
 
     fn check_size(&self, checkpoint: &[u8]) -> Result<(), LoadWorldError> {
@@ -318,7 +344,7 @@ impl World {
         let ticks = (SETTLING_S / (step_s * self.substeps as f64)).ceil() as u64;
         let commands = self.state.commands.clone();
         for _ in 0..ticks {
-            self.step(&commands).map_err(|error| BuildWorldError::Simulator(error.to_string()))?;
+            self.step(&commands).map_err(rejects)?;
         }
         self.state.tick = 0;
         self.data.set_time(0.0);
@@ -341,10 +367,20 @@ impl World {
         }
     }
 
-    /// Sets, for the step to come, the forces of grasps that are no welds: springs, and what slips.
-    fn pull(&mut self) {
+    /// Says in the truth what has pushed whom.
+    fn note_pushes(&mut self) {
+        let State { tick, robots, object, pushes, .. } = &mut self.state;
+        object.push_force_n = force_n(pushes, 0, *tick);
+        for (robot, truth) in robots.iter_mut().enumerate() {
+            truth.push_force_n = force_n(pushes, robot + 1, *tick);
+        }
+    }
+
+    /// Sets, for the step to come, the forces of grasps that are no welds, springs and what slips, and those from
+    /// outside.
+    fn pull(&mut self, is_pushed: bool) {
         let tick = self.state.tick;
-        if self.spring.is_none() && !self.failures.have_begun(tick) {
+        if self.spring.is_none() && !self.failures.have_begun(tick) && !is_pushed {
             return;
         }
         let object = self.layout.object.body;
@@ -356,7 +392,7 @@ impl World {
                 *wrench = match (self.failures.of_hand(tick, robot, index), self.spring) {
                     _ if holding & 1 << index == 0 => Wrench::zero(),
                     (Some(lost), _) => lost.wrench_on_object(&self.data, hand),
-                    (None, Some(spring)) => spring.wrench_on_object(&self.data, hand),
+                    (None, Some(spring)) => pull_of(&spring, &self.data, hand),
                     (None, None) => Wrench::zero(),
                 };
                 let palm = Vector3::from(self.data.site_xpos()[hand.palm_site]);
@@ -371,6 +407,9 @@ impl World {
                 }
                 applied[hand.palm_body] = on_hand;
             }
+        }
+        if is_pushed {
+            pushes::apply(&mut self.data, &self.layout, &self.state.pushes, tick);
         }
     }
 
@@ -435,7 +474,7 @@ impl World {
 
 impl State {
     /// All parts of a checkpoint as bytes, the simulator's first.
-    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 7] {
+    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 8] {
         [
             bytemuck::cast_slice_mut(simulator),
             bytemuck::bytes_of_mut(&mut self.tick),
@@ -444,6 +483,18 @@ impl State {
             bytemuck::cast_slice_mut(&mut self.readings),
             bytemuck::cast_slice_mut(&mut self.robots),
             bytemuck::bytes_of_mut(&mut self.object),
+            bytemuck::cast_slice_mut(&mut self.pushes),
         ]
     }
+}
+
+/// What the spring at a hand does to the object, at the palm's origin.
+fn pull_of(
+    spring: &Spring,
+    data: &MjData<Box<MjModel>>,
+    hand: &HandLayout,
+) -> Wrench<mikoshi_spatial::World> {
+    let at = |site| (site_pose::<Hand>(data, site), site_twist(data, site));
+    let ((palm, palm_twist), (place, place_twist)) = (at(hand.palm_site), at(hand.object_site));
+    spring.wrench_on_object((&palm, palm_twist), (&place, place_twist))
 }

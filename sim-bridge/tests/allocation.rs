@@ -6,6 +6,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bytemuck::Zeroable;
 use common::{standing_team, swinging_commands};
 use mikoshi_ipc_types::{ObjectTruth, RobotTruth, Sensors};
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::World;
 
 #[global_allocator]

@@ -4,7 +4,8 @@ mod common;
 
 use common::standing_team;
 use mikoshi_config::RunSpec;
-use mikoshi_sim_bridge::{BuildWorldError, World};
+use mikoshi_physics::{BuildWorldError, Physics as _};
+use mikoshi_sim_bridge::World;
 
 fn run() -> RunSpec {
     standing_team("hold", &[("team", "two")])

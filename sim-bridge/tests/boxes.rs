@@ -4,7 +4,8 @@ mod common;
 
 use common::{look, standing_team, wrench};
 use mikoshi_config::RunSpec;
-use mikoshi_sim_bridge::{GRAVITY_M_S2, World};
+use mikoshi_physics::{GRAVITY_M_S2, Physics as _};
+use mikoshi_sim_bridge::World;
 use nalgebra::Vector3;
 
 /// Two robots hold an object over a box that reaches `depth_m` into it from below.

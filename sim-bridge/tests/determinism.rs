@@ -4,7 +4,8 @@ mod common;
 
 use common::{bytes_of, look, standing_team, swinging_commands};
 use mikoshi_config::RunSpec;
-use mikoshi_sim_bridge::{LoadWorldError, World};
+use mikoshi_physics::{LoadWorldError, Physics as _};
+use mikoshi_sim_bridge::World;
 
 const NOISY: &[(&str, &str)] = &[
     ("team", "two"),

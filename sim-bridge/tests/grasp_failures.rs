@@ -4,6 +4,7 @@ mod common;
 
 use common::{bytes_of, constant_commands, look, standing_team, wrench};
 use mikoshi_config::RunSpec;
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::World;
 
 /// The tick from which the second robot's left hand holds nothing.

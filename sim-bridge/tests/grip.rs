@@ -5,7 +5,8 @@ mod common;
 use common::{bytes_of, constant_commands, look, standing_team, wrench};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::JointCommand;
-use mikoshi_sim_bridge::{GRAVITY_M_S2, World};
+use mikoshi_physics::{GRAVITY_M_S2, Physics as _};
+use mikoshi_sim_bridge::World;
 
 /// Two robots with open hands where they would hold an object that rests on a pedestal.
 fn about_to_grasp(scenario: &str, overrides: &[(&str, &str)]) -> RunSpec {

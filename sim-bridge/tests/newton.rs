@@ -5,7 +5,8 @@ mod common;
 
 use common::{Seen, constant_commands, look, pose, standing_team, swinging_commands, wrench};
 use mikoshi_humanoid::Model;
-use mikoshi_sim_bridge::{GRAVITY_M_S2, World};
+use mikoshi_physics::{GRAVITY_M_S2, Physics as _};
+use mikoshi_sim_bridge::World;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 const GRASPS: [&str; 2] = ["hold", "hold_spring"];

@@ -5,11 +5,12 @@ mod common;
 use common::{bytes_of, constant_commands, look, standing_team};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{Frame, JointCommand, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId};
+use mikoshi_physics::{BridgeParticipant, Physics as _};
 use mikoshi_runtime::{
     Call, InMemoryHub, InMemoryTransport, Loan, Observer, Participant, Placement, Publisher, Tap, TickError,
     TickSchedule, Transport,
 };
-use mikoshi_sim_bridge::{BridgeParticipant, World};
+use mikoshi_sim_bridge::World;
 
 type Port<P> = <InMemoryTransport as Transport>::Publisher<P>;
 
@@ -17,7 +18,7 @@ type Port<P> = <InMemoryTransport as Transport>::Publisher<P>;
 struct Scene {
     run: RunSpec,
     hub: InMemoryHub,
-    bridge: BridgeParticipant<InMemoryTransport>,
+    bridge: BridgeParticipant<InMemoryTransport, World>,
     servos: Vec<Port<JointCommand>>,
 }
 
@@ -26,7 +27,8 @@ impl Scene {
         let run = standing_team("hold", &[("team", "two")]);
         let schedule = TickSchedule::of_team(2, 0, &Placement::default()).expect("a schedule");
         let hub = InMemoryHub::new(schedule);
-        let bridge = BridgeParticipant::new(&run, &hub.transport(ServiceId::Bridge)).expect("a bridge");
+        let bridge =
+            BridgeParticipant::<_, World>::new(&run, &hub.transport(ServiceId::Bridge)).expect("a bridge");
         let servos = (0..2).map(|r| hub.transport(ServiceId::Servo(r)).publisher(r).expect("a port"));
         Self { servos: servos.collect(), run, hub, bridge }
     }

@@ -4,6 +4,7 @@ mod common;
 
 use common::{constant_commands, look, standing_team, swinging_commands};
 use mikoshi_ipc_types::Sensors;
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::World;
 
 /// What robot `robot` reads at each of the first ticks, all joints swinging.

@@ -3,6 +3,7 @@
 mod common;
 
 use common::standing_team;
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::World;
 use mujoco_rs::wrappers::mj_logging::log_error;
 use std::env;

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{constant_commands, look, pose, standing_team};
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::{World, world_xml};
 
 /// 10 s; the largest horizontal displacement of a sole.

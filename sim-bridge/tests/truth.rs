@@ -4,7 +4,8 @@ mod common;
 
 use common::{bytes_of, constant_commands, look, pose, standing_team};
 use mikoshi_config::RunSpec;
-use mikoshi_sim_bridge::{StepWorldError, World};
+use mikoshi_physics::{Physics, StepWorldError};
+use mikoshi_sim_bridge::World;
 
 fn two(overrides: &[(&str, &str)]) -> (RunSpec, World) {
     let mut all = vec![("team", "two")];

@@ -6,3 +6,4 @@ pub mod log;
 pub mod programs;
 pub mod run;
 pub mod scenarios;
+pub mod screen;

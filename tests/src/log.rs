@@ -1,5 +1,6 @@
 //! `run.mcap` as a list of messages, and where two of them part.
 
+use mikoshi_ipc_types::Payload;
 use mikoshi_observation::{LogReader, PayloadRef};
 use std::path::Path;
 
@@ -34,6 +35,17 @@ impl Log {
         }
         assert!(reader.damage().is_none(), "it is whole");
         Self { messages }
+    }
+
+    /// Every payload of a kind, as it was recorded: of robots, all of a tick before those of the next.
+    pub fn payloads<P: Payload>(&self) -> Vec<P> {
+        let of_kind = self.messages.iter().filter(|message| message.name == P::NAME);
+        let payload = |message: &Message| {
+            let mut payload = P::zeroed();
+            bytemuck::bytes_of_mut(&mut payload).copy_from_slice(&message.payload);
+            payload
+        };
+        of_kind.map(payload).collect()
     }
 
     /// Where two runs part: payload, robot, tick and field. None if they are the same to the last bit.

@@ -33,7 +33,16 @@ fn build(folder: &Path) {
     let target = folder.parent().expect("a profile's folder lies in the target folder");
     // The whole workspace, as `make build` does it: then nothing is compiled twice.
     let built = Command::new(cargo)
-        .args(["build", "--workspace", "--bins", "--quiet", "--profile", profile, "--target-dir"])
+        .args([
+            "build",
+            "--workspace",
+            "--bins",
+            "--examples",
+            "--quiet",
+            "--profile",
+            profile,
+            "--target-dir",
+        ])
         .arg(target)
         .current_dir(workspace())
         .status()

@@ -8,33 +8,31 @@ of each joint) and the fixed frames. ARM_JOINT6 opens the gripper and takes no p
 
 import math
 import pathlib
+import sys
 import tomllib
 
 HERE = pathlib.Path(__file__).parent
+sys.path.append(str(HERE.parent))
+
+from urdf import (  # noqa: E402, beside the folder of this file
+    ACCENT,
+    ALONG_Y,
+    DARK,
+    GREY,
+    MATERIALS,
+    WHITE,
+    box,
+    cylinder,
+    fixed,
+    joint_xml,
+    link_xml,
+    mirrored,
+    number,
+    sphere,
+    triple,
+)
+
 VELOCITY_LIMIT_RAD_S = 3.0  # the source's placeholder for every joint
-
-WHITE, GREY, DARK, ACCENT = "white", "grey", "dark", "accent"
-MATERIALS = {
-    WHITE: "0.92 0.92 0.90 1",
-    GREY: "0.55 0.57 0.60 1",
-    DARK: "0.20 0.21 0.23 1",
-    ACCENT: "0.16 0.31 0.55 1",
-}
-
-
-def box(size, at, material=None, rpy=(0, 0, 0)):
-    return ("box", size, at, rpy, material)
-
-
-def cylinder(radius, length, at, material=None, rpy=(0, 0, 0)):
-    return ("cylinder", (radius, length), at, rpy, material)
-
-
-def sphere(radius, at, material=None):
-    return ("sphere", (radius,), at, (0, 0, 0), material)
-
-
-ALONG_Y = (math.pi / 2, 0, 0)
 
 # Right limbs; the left ones mirror y. Link: (visuals, contact shapes).
 CENTRAL = {
@@ -109,69 +107,6 @@ HAND = (
 )
 PALM_BELOW_WRIST_M = 0.085
 SOLE_THICKNESS_M = 0.03
-
-
-def number(value):
-    return repr(round(float(value), 12) + 0.0)
-
-
-def triple(values):
-    return " ".join(number(v) for v in values)
-
-
-def mirrored(shape):
-    kind, size, (x, y, z), (roll, pitch, yaw), material = shape
-    return (kind, size, (x, -y, z), (-roll, pitch, -yaw), material)
-
-
-def shape_xml(tag, shape):
-    kind, size, at, rpy, material = shape
-    attributes = {
-        "box": lambda: f'size="{triple(size)}"',
-        "cylinder": lambda: f'radius="{number(size[0])}" length="{number(size[1])}"',
-        "sphere": lambda: f'radius="{number(size[0])}"',
-    }[kind]()
-    lines = [
-        f"    <{tag}>",
-        f'      <origin xyz="{triple(at)}" rpy="{triple(rpy)}"/>',
-        f"      <geometry><{kind} {attributes}/></geometry>",
-    ]
-    if tag == "visual":
-        lines.append(f'      <material name="{material}"/>')
-    return lines + [f"    </{tag}>"]
-
-
-def link_xml(name, inertial=None, visuals=(), contacts=()):
-    body = []
-    if inertial:
-        ixx, iyy, izz, ixy, ixz, iyz = map(number, inertial["inertia"])
-        body += [
-            "    <inertial>",
-            f'      <origin xyz="{triple(inertial["com"])}"/>',
-            f'      <mass value="{number(inertial["mass"])}"/>',
-            f'      <inertia ixx="{ixx}" ixy="{ixy}" ixz="{ixz}" iyy="{iyy}" iyz="{iyz}" izz="{izz}"/>',
-            "    </inertial>",
-        ]
-    for shape in visuals:
-        body += shape_xml("visual", shape)
-    for shape in contacts:
-        body += shape_xml("collision", shape)
-    return [f'  <link name="{name}">', *body, "  </link>"] if body else [f'  <link name="{name}"/>']
-
-
-def joint_xml(name, kind, parent, child, xyz, moving=()):
-    return [
-        f'  <joint name="{name}" type="{kind}">',
-        f'    <origin xyz="{triple(xyz)}"/>',
-        f'    <parent link="{parent}"/>',
-        f'    <child link="{child}"/>',
-        *moving,
-        "  </joint>",
-    ]
-
-
-def fixed(parent, child, xyz=(0, 0, 0), name=None):
-    return joint_xml(name or f"{child}_fixed", "fixed", parent, child, xyz)
 
 
 def shapes_of(name):

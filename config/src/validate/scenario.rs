@@ -1,9 +1,12 @@
 //! Scenarios: periods that divide each other, teams that agree with their models, gains in range.
 
 use super::checks::{Checks, Violation};
+use super::{hosts, operator};
 use crate::robot::RobotConfig;
-use crate::scenario::{Control, Grasp, InternalForces, Job, LostGrasp, Member, Motion, Policy, Scenario};
-use mikoshi_ipc_types::{MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS};
+use crate::scenario::{
+    Control, Grasp, Ground, InternalForces, Job, LostGrasp, Member, Motion, Policy, PushEvent, Scenario,
+};
+use mikoshi_ipc_types::{MAX_COORDINATION_DELAY_TICKS, MAX_ROBOTS, Push};
 use std::collections::BTreeSet;
 
 /// Ratios of periods count as whole within this.
@@ -12,6 +15,9 @@ const RATIO_TOLERANCE: f64 = 1e-9;
 const MAX_SENSOR_DELAY_TICKS: u64 = 1000;
 /// Longest run: a day at 1 kHz.
 const MAX_TICKS: f64 = 86.4e6;
+
+/// Nobody watches longer.
+const SLOWEST: f64 = 100.0;
 
 /// Highest foot of a step.
 const MAX_LIFT_M: f64 = 0.3;
@@ -42,6 +48,7 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
     for axis in 0..3 {
         checks.positive(format_args!("object.size_m.{axis}"), scenario.object.size_m[axis]);
         checks.finite(format_args!("object.position_m.{axis}"), scenario.object.position_m[axis]);
+        checks.finite(format_args!("object.com_m.{axis}"), scenario.object.com_m[axis]);
     }
     checks.finite("object.yaw_deg", scenario.object.yaw_deg);
     grasp(&mut checks, &scenario.grasp);
@@ -72,9 +79,13 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
         format_args!("more than 0, at most {MAX_LIFT_M} m"),
     );
     safety(&mut checks, scenario);
+    load(&mut checks, scenario);
+    operator::operator(&mut checks, scenario);
+    hosts::hosts(&mut checks, scenario);
     checks.not_negative("physics.friction", scenario.physics.friction);
     world(&mut checks, scenario);
     grasp_failures(&mut checks, scenario, configs);
+    pushes(&mut checks, scenario);
     let sensors = &scenario.sensors;
     checks.not_negative("sensors.force_noise_n", sensors.force_noise_n);
     checks.not_negative("sensors.moment_noise_nm", sensors.moment_noise_nm);
@@ -91,6 +102,46 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
         );
     }
     checks.0
+}
+
+fn load(checks: &mut Checks, scenario: &Scenario) {
+    let load = &scenario.load;
+    checks.not_negative("load.hand_moment_nm", load.hand_moment_nm);
+    let (shares, robots) = (load.shares.len(), scenario.robots.len());
+    let expected = format_args!("none, or one for each of {robots} robots");
+    checks.require(
+        shares == 0 || shares == robots,
+        "load.shares",
+        format_args!("{shares} numbers"),
+        expected,
+    );
+    for (robot, share) in load.shares.iter().enumerate() {
+        checks.not_negative(format_args!("load.shares.{robot}"), *share);
+    }
+    let sum: f64 = load.shares.iter().sum();
+    checks.require(
+        shares == 0 || sum > 0.0,
+        "load.shares",
+        format_args!("a sum of {sum}"),
+        "somebody who bears",
+    );
+    let mut mass_kg = scenario.object.mass_kg;
+    let mut changes: Vec<_> = scenario.world.load_changes.iter().enumerate().collect();
+    changes.sort_by(|(_, a), (_, b)| a.at_s.total_cmp(&b.at_s));
+    for (index, change) in changes {
+        let key = |name: &str| format!("world.load_changes.{index}.{name}");
+        checks.not_negative(key("at_s"), change.at_s);
+        for axis in 0..3 {
+            checks.finite(key(&format!("position_m.{axis}")), change.position_m[axis]);
+        }
+        mass_kg += change.mass_kg;
+        checks.require(
+            mass_kg > 0.0,
+            key("mass_kg"),
+            change.mass_kg,
+            "an object that is left with some mass",
+        );
+    }
 }
 
 fn safety(checks: &mut Checks, scenario: &Scenario) {
@@ -113,9 +164,6 @@ fn safety(checks: &mut Checks, scenario: &Scenario) {
         let is_by_symmetry = scenario.coordination.policy == Policy::Symmetry;
         checks.require(is_by_symmetry, key, "carry-on", "stop: a leader does not share what it carries");
     }
-    for (index, event) in safety.operator.iter().enumerate() {
-        checks.not_negative(format_args!("safety.operator.{index}.at_s"), event.at_s);
-    }
 }
 
 fn world(checks: &mut Checks, scenario: &Scenario) {
@@ -132,6 +180,29 @@ fn world(checks: &mut Checks, scenario: &Scenario) {
         if let Some(friction) = fixed.friction {
             checks.not_negative(format_args!("{key}.friction"), friction);
         }
+    }
+    if let Some(ground) = &scenario.world.ground {
+        let key = "world.ground";
+        checks.not_negative(format_args!("{key}.step_m"), ground.step_m);
+        let most = Ground::MAX_STEP_M;
+        checks.require(
+            ground.step_m <= most,
+            format_args!("{key}.step_m"),
+            ground.step_m,
+            format_args!("at most {most} m"),
+        );
+        checks.not_negative(format_args!("{key}.slope_deg"), ground.slope_deg);
+        let most = Ground::MAX_SLOPE_DEG;
+        checks.require(
+            ground.slope_deg <= most,
+            format_args!("{key}.slope_deg"),
+            ground.slope_deg,
+            format_args!("at most {most}"),
+        );
+        if let Some(friction) = ground.patch_friction {
+            checks.positive(format_args!("{key}.patch_friction"), friction);
+        }
+        checks.positive(format_args!("{key}.patch_contact_s"), ground.patch_contact_s);
     }
 }
 
@@ -163,10 +234,34 @@ fn grasp_failures(checks: &mut Checks, scenario: &Scenario, configs: &[&RobotCon
     }
 }
 
+fn pushes(checks: &mut Checks, scenario: &Scenario) {
+    for (index, push) in scenario.world.pushes.iter().enumerate() {
+        let key = |name: &str| format!("world.pushes.{index}.{name}");
+        checks.not_negative(key("at_s"), push.at_s);
+        let expected = format!("more than 0, at most {} s", PushEvent::MAX_S);
+        checks.require(
+            push.for_s > 0.0 && push.for_s <= PushEvent::MAX_S,
+            key("for_s"),
+            push.for_s,
+            expected,
+        );
+        let expected = format!("forces of at most {} N", Push::MAX_FORCE_N);
+        let is_weak = push.force_n.iter().all(|force| force.abs() <= Push::MAX_FORCE_N);
+        checks.require(is_weak, key("force_n"), format_args!("{:?}", push.force_n), expected);
+        checks.finite(key("heading_deg"), push.heading_deg);
+        let names: Vec<_> = scenario.robots.iter().map(|member| member.name.as_str()).collect();
+        let expected = format!("object, or a robot of the team: {}", names.join(", "));
+        let is_known = scenario.push_target(&push.on).is_some();
+        checks.require(is_known, key("on"), format_args!("{:?}", push.on), expected);
+    }
+}
+
 fn times(checks: &mut Checks, scenario: &Scenario) {
     let period = scenario.control_period_s;
     checks.positive("control_period_s", period);
     checks.positive("duration_s", scenario.duration_s);
+    let slow = scenario.slow_motion;
+    checks.require((1.0..=SLOWEST).contains(&slow), "slow_motion", slow, format_args!("1 to {SLOWEST}"));
     if period > 0.0 && scenario.duration_s > 0.0 {
         let ticks = whole_ratio(scenario.duration_s, period);
         let expected =

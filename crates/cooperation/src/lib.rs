@@ -90,6 +90,7 @@ mod hybrid;
 mod internal_forces;
 mod landmark;
 mod linear;
+mod load;
 mod parting;
 mod selection;
 mod team_arms;
@@ -110,6 +111,9 @@ pub use internal_forces::{
 };
 pub use landmark::{BuildLandmarkError, FrameCorrection, Landmark, LandmarkParameters, Sighting};
 pub use linear::Linear;
+pub use load::{
+    Bearer, CarriedBody, LoadIdentifier, LoadIdentifierState, largest_moment_of_equal_tips_nm, share_load,
+};
 pub use parting::{Gap, Parting, PartingLimits};
 pub use selection::{Axis, Control, Selection};
 pub use team_arms::{BuildTeamArmsError, RobotArms, TeamArms};

@@ -155,6 +155,16 @@ impl Kinematics {
         self.com
     }
 
+    /// Origin \[m\] and axis of joint j in the world.
+    pub(crate) fn joint(&self, j: usize) -> (Vector3<f64>, Vector3<f64>) {
+        (self.bodies[j + 1].position, self.axes[j])
+    }
+
+    /// Centre of mass of all that joint j moves, which has some mass \[m\].
+    pub(crate) fn com_beyond(&self, model: &Model, j: usize) -> Vector3<f64> {
+        self.moments[j + 1] / model.subtree_mass_kg(j + 1)
+    }
+
     /// Geometric Jacobian of a frame's origin, 6 × (6 + n): ẋ_F = J ν, world axes, linear before
     /// angular.
     pub fn frame_jacobian(&self, model: &Model, frame: FrameId, jacobian: &mut Matrix6xX<f64>) {

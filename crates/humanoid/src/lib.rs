@@ -16,6 +16,7 @@ pub mod gait;
 pub mod ik;
 pub mod kinematics;
 pub mod model;
+pub mod statics;
 
 pub use ik::{IkConfig, IkGains, IkReport, IkScratch, IkState, IkTargets, WholeBodyIk};
 pub use kinematics::Kinematics;

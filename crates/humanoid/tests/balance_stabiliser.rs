@@ -130,6 +130,48 @@ impl Loop {
     }
 }
 
+/// How far a sole tilts on ground that does not yield, under an ankle's drive of which only damping counts, from a tilt of
+/// 1 mrad on: what is left after a hundred ticks.
+fn tilt_left(config: StabiliserConfig, damping_nms_rad: f64) -> f64 {
+    let stabiliser = Stabiliser::new(StabiliserConfig { leak_s: 1e9, ..config });
+    let robot = Robot::standing_at(GroundPose::default(), on_rigid_ground());
+    let now = robot.gait.reference(&robot.state);
+    let standing = PerFoot::from_fn(|side| Some(now.feet[side].pose));
+    let mut inputs = StabiliserInputs {
+        com_ref: now.com.xy(),
+        com_velocity_ref: STILL,
+        com_acceleration_ref: STILL,
+        com: now.com.xy(),
+        com_velocity: STILL,
+        standing,
+        ground_wrench: PerFoot::from_fn(|_| Wrench::zero()),
+        load: ExternalLoad::NONE,
+    };
+    let mut state = StabiliserState::default();
+    let desired = stabiliser.act(&mut state.clone(), &inputs).loads;
+    state.sole_tilt.right.y = 1e-3;
+    let mut before = 0.0;
+    for _ in 0..100 {
+        let foot = inputs.standing.right.expect("it stands").translation.xy();
+        let moment = desired.right.moment_about(&foot)
+            - Vector2::new(0.0, damping_nms_rad * (state.sole_tilt.right.y - before) / DT);
+        before = state.sole_tilt.right.y;
+        inputs.ground_wrench.right = Wrench::new(Vector3::zeros(), moment.push(0.0));
+        stabiliser.act(&mut state, &inputs);
+    }
+    (state.sole_tilt.right.y - before).abs()
+}
+
+#[test]
+fn soles_under_drives_that_damp_more_do_not_alternate_from_tick_to_tick() {
+    for damping in [500.0, 700.0, 3000.0] {
+        let left = tilt_left(config().for_leg_drives(damping), damping);
+        assert!(left < 1e-9, "{damping} Nms/rad: {left} rad");
+    }
+    assert!(tilt_left(config(), 3000.0) > 0.01, "what is for softer drives alternates");
+    assert_eq!(config().for_leg_drives(400.0), config());
+}
+
 #[test]
 fn on_soft_ankles_a_push_that_tips_the_robot_is_withstood_with_the_stabiliser() {
     for push in [Vector2::new(80.0, 0.0), Vector2::new(-100.0, 0.0), Vector2::new(0.0, 120.0)] {

@@ -8,8 +8,14 @@ fn timing() -> StepTiming {
     StepTiming { lead: 4, first_shift: 5, double_support: 2, single_support: 6, rest: 10, patience: 8 }
 }
 
-const WALKER: StepWish =
-    StepWish { wants_step: true, can_stop: false, ready: true, first_swing: Side::Left, urgency: 1.5 };
+const WALKER: StepWish = StepWish {
+    wants_step: true,
+    can_stop: false,
+    ready: true,
+    first_swing: Side::Left,
+    urgency: 1.5,
+    land_in_ticks: 0,
+};
 
 fn stepping(step_index: u64, tick_in_step: u64, will_continue: bool) -> StepClock {
     let swing = if step_index.is_multiple_of(2) { Side::Left } else { Side::Right };
@@ -198,4 +204,32 @@ fn a_robot_that_is_not_told_of_a_further_step_takes_the_announced_one_and_stops(
     assert_eq!(ahead(timing().step(0)), stepping(1, 0, false));
     assert_eq!(ahead(timing().step(0) + timing().step(1)), StepClock::Finishing { tick: 0 });
     assert_eq!(ahead(1000), StepClock::Standing);
+}
+
+#[test]
+fn all_land_as_soon_as_one_robot_needs_it_and_never_later_than_they_were_to() {
+    let swinging = at(stepping(1, 3, true));
+    let falling = StepWish { land_in_ticks: 2, ..WALKER };
+    let land_in = |clock: StepClock| match clock {
+        StepClock::Stepping { step_index, tick_in_step, .. } => timing().step(step_index) - tick_in_step,
+        _ => 0,
+    };
+    let next = swinging.advance(&timing(), &[WALKER, falling], true).clock;
+    assert_eq!(land_in(next), 2, "{next:?}");
+    let patient = StepWish { land_in_ticks: 100, ..WALKER };
+    assert_eq!(swinging.advance(&timing(), &[patient], true), swinging.advance(&timing(), &[WALKER], true));
+    // On two feet there is nothing to hurry: weight is not shifted in no time.
+    let shifting = at(stepping(1, 0, true));
+    assert_eq!(shifting.advance(&timing(), &[falling], true), shifting.advance(&timing(), &[WALKER], true));
+}
+
+#[test]
+fn a_robot_that_falls_where_it_stands_has_all_step_without_a_head_start() {
+    let falling = StepWish { land_in_ticks: 1, ..WALKER };
+    let StepClock::Stepping { step_index: 0, tick_in_step, .. } =
+        TeamClock::default().advance(&timing(), &[StepWish::CONTENT, falling], true).clock
+    else {
+        panic!("it steps")
+    };
+    assert_eq!(tick_in_step, timing().lift_off(0) - timing().first_shift / 4);
 }

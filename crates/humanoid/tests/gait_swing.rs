@@ -139,3 +139,45 @@ fn a_foot_at_its_bound_has_no_speed() {
     let swing = Swing { contact: SwingContact::Lowering { at }, ..Swing::new(from(), to()) };
     assert_eq!(swing.foot(&config(), 1.01, DURATION).1.linear.z, 0.0);
 }
+
+/// Positions of a swing whose foothold moves by `moved` and whose landing comes `sooner` ticks sooner, from tick 60 on.
+fn bent(moved: f64, sooner: u64) -> Vec<[f64; 3]> {
+    let mut swing = Swing::new(from(), to());
+    let share = |tick: u64| (tick + if tick > 60 { sooner } else { 0 }) as f64 / TICKS as f64;
+    (1..=TICKS - sooner)
+        .map(|tick| {
+            if tick == 61 {
+                swing.bend(&config(), share(60), DURATION);
+                swing.bent.as_mut().expect("bent").hurry((1.0 - share(61)) * DURATION);
+                swing.to.pose.position.y += moved;
+            }
+            swing.advance(&config(), (1.0 - share(tick)) * DURATION, DT);
+            let translation = swing.foot(&config(), share(tick), DURATION).0.translation;
+            translation.into()
+        })
+        .collect()
+}
+
+#[test]
+fn a_swing_that_is_bent_without_need_goes_where_it_would_have_gone() {
+    for (tick, position) in bent(0.0, 0).into_iter().enumerate() {
+        let end = Foothold { height: to().height + config().touchdown_m, ..to() };
+        let (pose, _) = swing_foot(&from(), &end, 0.05, (tick + 1) as f64 / TICKS as f64, DURATION);
+        assert!((pose.translation - nalgebra::Vector3::from(position)).norm() < 1e-9, "{tick}");
+    }
+}
+
+#[test]
+fn a_swing_whose_foothold_and_time_change_lands_there_then_and_without_a_jolt() {
+    let way = bent(0.05, 20);
+    let end = way[way.len() - 1];
+    assert!(
+        (end[1] - (to().pose.position.y + 0.05)).abs() < 1e-9 && (end[2] - 0.001).abs() < 1e-9,
+        "{end:?}"
+    );
+    let most = way.windows(3).flat_map(|three| {
+        (0..3).map(|axis| (three[2][axis] - 2.0 * three[1][axis] + three[0][axis]).abs() / (DT * DT))
+    });
+    let most = most.fold(0.0, f64::max);
+    assert!(most < 15.0, "{most} m/s²");
+}

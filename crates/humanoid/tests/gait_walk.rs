@@ -322,7 +322,9 @@ fn a_load_in_the_hands_moves_the_centre_of_mass_and_not_the_zmp() {
             hand_centre: Some(robot.centre),
             foot_force: PerFoot { right: 300.0, left: 300.0 },
             soles: None,
+            sole_heights: None,
             load,
+            divergent_component: None,
         };
         robot.gait.act(&mut robot.state, &inputs);
     }
@@ -344,7 +346,9 @@ fn a_tick_allocates_nothing_and_a_copy_of_the_state_goes_on_alike() {
             hand_centre: Some(robot.centre),
             foot_force: PerFoot { right: 275.0, left: 275.0 },
             soles: None,
+            sole_heights: None,
             load: ExternalLoad::NONE,
+            divergent_component: None,
         };
         let mut twin = copy;
         let (reference, _) = assert_no_alloc(|| {

@@ -250,6 +250,7 @@ fn an_arm_speed_cap_binds_arms_and_nothing_else() {
     let (setup, start) = common::settled();
     let mut config = setup.ik.config().clone();
     config.gains.arm_speed = Some(0.2);
+    config.gains.trunk_acceleration = 1e3;
     let ik = WholeBodyIk::new(&setup.model, config).unwrap();
     let mut setup = Carrying { ik, ..setup };
     let (mut state, mut targets) = (start, setup.targets);
@@ -272,6 +273,26 @@ fn an_arm_speed_cap_binds_arms_and_nothing_else() {
     }
     assert!((fastest_arm - 0.2).abs() < 1e-9, "{fastest_arm}");
     assert!(fastest_leg > 0.5 && fastest_chest > 0.5, "{fastest_leg}, {fastest_chest}");
+}
+
+#[test]
+fn trunk_and_head_gain_speed_gently_whatever_is_asked_of_hands_and_feet() {
+    let (mut setup, mut state) = common::settled();
+    let mut targets = setup.targets;
+    move_hand(&mut targets, 0, [0.1, 0.0, 0.1], [0.0; 3]);
+    move_hand(&mut targets, 1, [-0.1, 0.0, 0.1], [0.0; 3]);
+    targets.feet.left.translation.x += 0.1;
+    let most = setup.ik.config().gains.trunk_acceleration * setup.ik.config().period_s;
+    for _ in 0..100 {
+        let before = state;
+        follow(&mut setup, &mut state, &targets, 1);
+        for (j, joint) in setup.model.joints().iter().enumerate() {
+            // Before a limit of position they stop as they must.
+            let gain = state.joint_velocity[j].abs() - before.joint_velocity[j].abs();
+            let is_of_trunk = joint.name.starts_with("CHEST") || joint.name.starts_with("HEAD");
+            assert!(!is_of_trunk || gain < most + 1e-9, "{}: {gain}", joint.name);
+        }
+    }
 }
 
 #[test]

@@ -3,7 +3,8 @@
 use crate::canonical::Observation;
 use crate::course::Course;
 use crate::internal::{InternalFigures, raise};
-use crate::summary::{InternalSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary};
+use crate::load::LoadFigures;
+use crate::summary::{InternalSummary, LoadSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary};
 use crate::truth::{FootTracker, ObjectTracker, TrackedObject};
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, ObjectTruth, RobotState, RobotTruth, mode};
 use mikoshi_spatial::{Object, Pose, World};
@@ -60,6 +61,7 @@ pub struct ObservedRun {
 pub struct Figures {
     run: ObservedRun,
     internal: InternalFigures,
+    load: LoadFigures,
     tracker: ObjectTracker,
     modes: Vec<(u64, u64)>,
     object: ObjectFigures,
@@ -82,6 +84,7 @@ pub struct JudgedFigures {
     pub drift_between_robots_m: f64,
     pub modes: Vec<ModeSummary>,
     pub minutes: Vec<MinuteSummary>,
+    pub load: LoadSummary,
 }
 
 impl Figures {
@@ -94,6 +97,7 @@ impl Figures {
         Self {
             tracker: ObjectTracker::new(&run),
             internal: InternalFigures::new(&run),
+            load: LoadFigures::default(),
             course: Course::new(run.control_period_s),
             run,
             modes: vec![],
@@ -115,6 +119,7 @@ impl Figures {
         }
         let team_state = &observation.team_state.payload;
         self.internal.observe(observation.tick(), object.internal, team_state);
+        self.load.observe(observation.tick(), team_state);
         if self.modes.last().is_none_or(|(mode, _)| *mode != team_state.team_mode) {
             self.modes.push((team_state.team_mode, observation.tick()));
         }
@@ -163,6 +168,7 @@ impl Figures {
                 })
                 .collect(),
             internal: self.internal.finish(),
+            load: self.load.finish(period_s),
             unintended_contact_ticks: self.unintended_contact_ticks,
         }
     }

@@ -44,6 +44,11 @@ impl Freshness {
         of_servos.flat_map(|(_, ticks)| ticks).collect::<BTreeSet<_>>().len() as u64
     }
 
+    /// Ticks in which this service's command was not there when it was needed.
+    pub fn ticks_missed(&self, service: ServiceId) -> u64 {
+        self.missing.get(&service).map_or(0, |ticks| ticks.len() as u64)
+    }
+
     /// Ticks that were lost around the one in which this service's process was replaced.
     pub fn ticks_lost(&self, service: ServiceId, tick: u64) -> u64 {
         let around = tick.saturating_sub(BEFORE_TICKS)..tick.saturating_add(AFTER_TICKS);
@@ -88,6 +93,8 @@ mod tests {
         assert_eq!(freshness.ticks_held(), 3);
         assert_eq!(freshness.ticks_lost(ServiceId::Servo(1), 100), 3);
         assert_eq!(freshness.ticks_lost(ServiceId::Servo(1), 190), 0);
+        assert_eq!(freshness.ticks_missed(ServiceId::Servo(1)), 3);
+        assert_eq!(freshness.ticks_missed(ServiceId::Servo(0)), 0);
         assert_eq!(freshness.ticks_lost(ServiceId::Servo(0), 100), 0);
         assert_eq!(freshness.ticks_lost(ServiceId::Coordinator, 148), 1);
     }

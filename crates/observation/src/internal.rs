@@ -21,6 +21,8 @@ pub(crate) struct InternalFigures {
     rows: Vec<InternalSummary>,
     /// Of the last ticks, over which the end is judged.
     end: VecDeque<Vec<Wrench<Object>>>,
+    /// Distances from references in the same ticks.
+    end_errors: VecDeque<Vec<Wrench<Object>>>,
     /// Largest differences between measured and true ones in each of the last ticks.
     errors: VecDeque<(f64, f64)>,
 }
@@ -34,6 +36,7 @@ impl InternalFigures {
             start_tick: None,
             rows: run.internal_rows.iter().map(|(name, _)| named(name)).collect(),
             end: VecDeque::new(),
+            end_errors: VecDeque::new(),
             errors: VecDeque::new(),
         }
     }
@@ -46,11 +49,16 @@ impl InternalFigures {
         let ticks = |time_s: f64| (time_s / self.control_period_s).round() as u64;
         let start = *self.start_tick.get_or_insert(tick);
         let judged = start + ticks(JUDGED_AFTER_S)..=start + ticks(JUDGED_AFTER_S + WINDOW_S);
-        for (summary, force_A) in self.rows.iter_mut().zip(&forces) {
+        let references = team_state.generalized_force_ref.iter().skip(1).map(Wrench::<Object>::from_array);
+        let errors: Vec<_> =
+            forces.iter().zip(references).map(|(force, reference)| *force - reference).collect();
+        for ((summary, force_A), error_A) in self.rows.iter_mut().zip(&forces).zip(&errors) {
             let (force_n, moment_nm) = (force_A.force.norm(), force_A.moment.norm());
             if tick >= *judged.start() {
                 raise(&mut summary.peak_n, force_n);
                 raise(&mut summary.peak_nm, moment_nm);
+                raise(&mut summary.error_peak_n, error_A.force.norm());
+                raise(&mut summary.error_peak_nm, error_A.moment.norm());
             }
             if tick == start {
                 (summary.start_n, summary.start_nm) = (force_n, moment_nm);
@@ -70,6 +78,7 @@ impl InternalFigures {
             keep(&mut self.errors, largest, ticks(COMPARED_S));
         }
         keep(&mut self.end, forces, ticks(WINDOW_S));
+        keep(&mut self.end_errors, errors, ticks(WINDOW_S));
     }
 
     /// Largest differences between measured and true forces and moments.
@@ -86,6 +95,12 @@ impl InternalFigures {
                 for (mean, value) in summary.end_mean.iter_mut().zip(force_A.to_array()) {
                     *mean += value / samples;
                 }
+            }
+        }
+        for errors in &self.end_errors {
+            for (summary, error_A) in self.rows.iter_mut().zip(errors) {
+                raise(&mut summary.error_end_n, error_A.force.norm());
+                raise(&mut summary.error_end_nm, error_A.moment.norm());
             }
         }
         self.rows

@@ -43,6 +43,26 @@ pub struct Summary {
     pub timing: Timing,
     pub faults: Vec<Fault>,
     pub swaps: Vec<Swap>,
+    /// What is carried, as the team knew it last.
+    #[serde(default)]
+    pub load: LoadSummary,
+}
+
+/// What is carried, in the object's axes, by hands' wrenches and motion; standard deviations beside. All zero where nobody
+/// knows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct LoadSummary {
+    pub mass_kg: f64,
+    pub mass_std_kg: f64,
+    /// Since when the mass has not changed by more than 3 %.
+    pub mass_stays_since_s: f64,
+    /// Centre of mass from the object's origin.
+    pub com_m: [f64; 3],
+    pub com_std_m: [f64; 3],
+    /// About the centre of mass: xx, yy, zz, xy, xz, yz.
+    pub inertia_kg_m2: [f64; 6],
+    pub inertia_std_kg_m2: [f64; 6],
 }
 
 /// A mode of the team, and when it began.
@@ -116,6 +136,16 @@ pub struct InternalSummary {
     pub end_nm: f64,
     /// Mean wrench of the last 0.2 s in the object's axes.
     pub end_mean: [f64; 6],
+    /// Largest distance from its reference once what was there at the start has had its 3 s to go.
+    #[serde(default)]
+    pub error_peak_n: f64,
+    #[serde(default)]
+    pub error_peak_nm: f64,
+    /// The same of the last 0.2 s.
+    #[serde(default)]
+    pub error_end_n: f64,
+    #[serde(default)]
+    pub error_end_nm: f64,
 }
 
 /// One robot.

@@ -1,6 +1,6 @@
 //! Why there is no picture.
 
-use mikoshi_sim_bridge::BuildWorldError;
+use mikoshi_physics::BuildWorldError;
 use std::io;
 use std::path::PathBuf;
 

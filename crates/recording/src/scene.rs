@@ -10,11 +10,10 @@ use foxglove::messages::{
 };
 use mikoshi_config::{RobotSpec, RunSpec};
 use mikoshi_humanoid::balance::PerFoot;
-use mikoshi_humanoid::estimate::{SoleRectangle, SupportPolygon};
+use mikoshi_humanoid::estimate::SoleRectangle;
 use mikoshi_ipc_types::RobotTruth;
-use mikoshi_observation::{LogWriter, Observation, ObservedRobot, WriteLogError, is_loaded};
+use mikoshi_observation::{LogWriter, Observation, ObservedRobot, WriteLogError, true_support};
 use mikoshi_robot::Robot;
-use mikoshi_spatial::Pose;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 const OBJECT_COLOR: [f64; 4] = [0.80, 0.55, 0.25, 0.9];
@@ -108,11 +107,7 @@ impl Standing {
     /// Support polygon, zero moment point, and the forces that its hands apply to the object.
     fn entity(&self, truth: &RobotTruth) -> SceneEntity {
         let mut entity = entity(of_link(&self.name, "balance"), WORLD.to_owned());
-        let standing = PerFoot::from_fn(|side| {
-            let foot = side as usize;
-            Pose::from_array(truth.sole_pose.get(foot)?).filter(|_| is_loaded(truth, foot, self.weight_n))
-        });
-        let support = SupportPolygon::of_feet(&self.soles, &standing);
+        let support = true_support(&self.soles, truth, self.weight_n);
         let corner = |corner: &nalgebra::Vector2<f64>| point(&Vector3::new(corner.x, corner.y, GROUND_M));
         entity.lines.push(LinePrimitive {
             r#type: Type::LineLoop as i32,

@@ -69,7 +69,7 @@ pub fn check_robot(loaded: &LoadedRobot) -> Result<CheckedRobot, LoadConfigError
 }
 
 fn check_drives(loaded: &LoadedRobot, model: &Model) -> Result<(), LoadConfigError> {
-    let is_driven = |joint: &str| loaded.config.drives.iter().any(|drive| drive.is_for(joint));
+    let is_driven = |joint: &str| loaded.config.drive_of(joint).is_some();
     let idle: Vec<_> =
         model.joints().iter().map(|joint| joint.name.as_str()).filter(|joint| !is_driven(joint)).collect();
     if idle.is_empty() {

@@ -7,6 +7,7 @@
 #![allow(non_snake_case)]
 
 mod check;
+mod hosts;
 mod motion;
 mod robot;
 mod run_file;
@@ -14,8 +15,9 @@ mod schedule;
 mod surface;
 
 pub use check::{CheckedRobot, check_robot};
+pub use hosts::{Crossing, crossings, services_on_board};
 pub use run_file::{RunFileError, read_run, read_spec, world_file, write_run, write_spec, write_world};
-pub use schedule::tick_schedule;
+pub use schedule::{placement_of, tick_schedule};
 
 use mikoshi_config::{LoadConfigError, LoadedScenario, RunSpec};
 use robot::{Models, resolve_robot};

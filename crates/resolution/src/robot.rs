@@ -3,10 +3,12 @@
 use crate::surface::distance_to_box;
 use core::fmt::Display;
 use mikoshi_config::robot::HandConfig;
-use mikoshi_config::scenario::{Member, Object as ObjectConfig};
+use mikoshi_config::scenario::{Member, Object as ObjectConfig, Scenario};
 use mikoshi_config::{LoadConfigError, LoadedRobot, LoadedScenario, RobotConfig, RobotSpec};
-use mikoshi_humanoid::balance::{PerFoot, Side};
+use mikoshi_humanoid::Kinematics;
+use mikoshi_humanoid::balance::{GRAVITY_M_S2, PerFoot, Side};
 use mikoshi_humanoid::ik::{IkScratch, IkTargets, SettlePostureError};
+use mikoshi_humanoid::statics::Burden;
 use mikoshi_ipc_types::MAX_HANDS;
 use mikoshi_robot::Robot;
 use mikoshi_spatial::{Base, CoordinateFrame, Foot, Hand, Object, Pose, World};
@@ -15,6 +17,17 @@ use std::collections::BTreeMap;
 
 /// How far a palm may be from the surface that it holds.
 const PALM_TO_SURFACE_M: f64 = 0.020;
+
+/// Part of a robot's weight from which on what it bears decides how it stands.
+const HEAVY_SHARE: f64 = 0.05;
+/// What another stance must spare at least, as a share of a joint's limit.
+const WORTH_IT: f64 = 0.01;
+/// How far a robot may stand nearer to its hands than configured, and with its centre of mass higher: parts of that
+/// centre's height.
+const NEARER: f64 = 0.09;
+const HIGHER: f64 = 0.038;
+/// In so many steps.
+const STANCE_STEPS: usize = 4;
 
 /// A robot's own frame on the ground: midpoint between its soles, x ahead, z up.
 #[derive(Clone, Copy, Debug)]
@@ -78,13 +91,14 @@ pub(crate) fn resolve_robot(
         hand_in_object.push(X_AH.to_array());
     }
 
-    let mut targets = standing(&X_WG, config, hands);
-    let mut settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
+    let force_n = expected_force_n(&scenario.scenario, index);
+    let settle = |targets: &IkTargets| settle(scenario, usable, index, member, &grasping_hands, targets);
+    let (mut targets, mut settled) = stance(usable, &X_WG, hands, force_n, settle)?;
     if let Some(job) = &scenario.scenario.job {
         for hand in targets.hands.iter_mut().flatten() {
             *hand = *hand * drawn_back(job.draw_back_m);
         }
-        settled = settle(scenario, usable, index, member, &grasping_hands, &targets)?;
+        settled = settle(&targets)?;
     }
     Ok(RobotSpec {
         member: member.clone(),
@@ -95,6 +109,66 @@ pub(crate) fn resolve_robot(
         grasping_hands,
         hand_in_object,
     })
+}
+
+/// Of its share of the object's weight, as the scenario has both.
+fn expected_force_n(scenario: &Scenario, robot: usize) -> f64 {
+    let shares = &scenario.load.shares;
+    let sum: f64 = shares.iter().sum();
+    let share = shares.get(robot).map_or(1.0 / scenario.robots.len() as f64, |share| share / sum);
+    scenario.object.mass_kg * GRAVITY_M_S2 * share
+}
+
+/// Where a robot stands that will bear so much, and the posture in which it does: as its configuration has it; with a heavy
+/// load nearer to its hands and with straighter legs, as far as that spares the joint that needs most of its limit.
+fn stance(
+    usable: &UsableModel<'_>,
+    X_WG: &Pose<World, Ground>,
+    hands: [Option<Pose<World, Hand>>; MAX_HANDS],
+    force_n: f64,
+    settle: impl Fn(&IkTargets) -> Result<Vec<f64>, LoadConfigError>,
+) -> Result<(IkTargets, Vec<f64>), LoadConfigError> {
+    let (robot, config) = (&usable.robot, &usable.loaded.config);
+    let targets = standing(X_WG, config, hands);
+    let mut best = (targets, settle(&targets)?);
+    let is_heavy = force_n > HEAVY_SHARE * robot.model.total_mass_kg() * GRAVITY_M_S2;
+    if !is_heavy {
+        return Ok(best);
+    }
+    let judge = |targets: &IkTargets, settled: &[f64]| {
+        // Under its load it stands farther back.
+        let Burden { moment_nm, .. } = burden(robot, targets, settled, force_n);
+        let palms = targets.hands.iter().flatten().map(|hand| hand.translation);
+        let centre = palms.clone().sum::<Vector3<f64>>() / palms.count().max(1) as f64;
+        let lever = (centre - targets.com).xy().push(0.0);
+        let relieved = 1.0 - moment_nm.norm() / (force_n * lever.norm()).max(1e-9);
+        let weight_n = robot.model.total_mass_kg() * GRAVITY_M_S2;
+        let back = lever * (relieved.clamp(0.0, 1.0) * force_n / weight_n);
+        let loaded = IkTargets { com: targets.com - back, ..*targets };
+        settle(&loaded).map(|settled| burden(robot, &loaded, &settled, force_n).torque_share)
+    };
+    // Even what it can't bear it may try.
+    let mut least = judge(&best.0, &best.1).unwrap_or(f64::INFINITY);
+    for step in 1..=STANCE_STEPS {
+        let part = config.com_height_m * step as f64 / STANCE_STEPS as f64;
+        let ahead = Pose::new(Vector3::new(NEARER * part, 0.0, 0.0), UnitQuaternion::identity());
+        let mut targets = standing(&(*X_WG * ahead), config, hands);
+        targets.com.z += HIGHER * part;
+        // What is out of reach ends the search.
+        let Ok(settled) = settle(&targets) else { break };
+        let Ok(share) = judge(&targets, &settled) else { break };
+        if share < least - WORTH_IT {
+            (best, least) = ((targets, settled), share);
+        }
+    }
+    Ok(best)
+}
+
+/// What a posture costs with so much in its hands.
+fn burden(robot: &Robot, targets: &IkTargets, posture_rad: &[f64], force_n: f64) -> Burden {
+    let mut kinematics = Kinematics::new(&robot.model);
+    kinematics.update(&robot.model, &base_pose(robot, posture_rad, targets), posture_rad);
+    robot.burden(&kinematics, force_n, None)
 }
 
 /// A robot that stands here, with its hands there.

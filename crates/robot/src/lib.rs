@@ -5,11 +5,13 @@
 
 use mikoshi_config::RobotConfig;
 use mikoshi_config::robot::Meshes;
-use mikoshi_humanoid::balance::PerFoot;
+use mikoshi_humanoid::balance::{PerFoot, Side};
 use mikoshi_humanoid::estimate::{ForceTorqueSensor, SoleRectangle};
 use mikoshi_humanoid::ik::ConfigureIkError;
 use mikoshi_humanoid::model::{FindElementError, PackageTable};
-use mikoshi_humanoid::{FrameId, IkConfig, IkGains, Model, WholeBodyIk};
+use mikoshi_humanoid::statics::{Bearing, Burden};
+use mikoshi_humanoid::{FrameId, IkConfig, IkGains, Kinematics, Model, WholeBodyIk};
+use nalgebra::Vector2;
 
 /// A robot's body, and what its parts are for. Immutable.
 #[derive(Clone, Debug)]
@@ -107,6 +109,19 @@ impl Robot {
         self.palms = hands.iter().map(|&hand| self.palms[hand]).collect();
         self.wrist_sensors = hands.iter().map(|&hand| self.wrist_sensors[hand]).collect();
         Ok(self)
+    }
+
+    /// What it would bear in the posture of `kinematics`, with hands that lift with `force_n` together, on one foot, this
+    /// one or whichever.
+    pub fn burden(&self, kinematics: &Kinematics, force_n: f64, on: Option<Side>) -> Burden {
+        let under = |side: Side| {
+            let sole = &self.sole_rectangles[side];
+            Vector2::new((sole.x_min + sole.x_max) / 2.0, 0.0)
+        };
+        let foot = |side: Side| on.is_none_or(|on| on == side).then(|| self.soles[side]);
+        let feet = PerFoot::from_fn(foot);
+        let bearing = Bearing { hands: &self.palms, feet, zmp_in_foot: PerFoot::from_fn(under) };
+        bearing.burden(&self.model, kinematics, force_n)
     }
 
     /// Eq. 41 for its hands, feet and waist, about its carry posture.

@@ -4,13 +4,14 @@
 //! It is what `mikoshi status` reads, where services meet before the first tick and after the last, and
 //! where one that waits learns that another has died.
 
+use crate::mailbox::Mailbox;
 use crate::process::ProcessIdentity;
 use crate::wait::Bed;
 use crate::{FaultCode, Position, TickError};
 use core::fmt;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use memmap2::MmapRaw;
-use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId, operator};
+use mikoshi_ipc_types::{Drive, MAX_ROBOTS, OperatorInput, Push, ServiceId, operator};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::unix::fs::OpenOptionsExt;
@@ -23,6 +24,8 @@ pub enum Role {
     Supervisor,
     /// The one observer that is connected from the first tick; all other observers attach to it.
     Tap,
+    /// What carries frames between this host and others, where there are any.
+    Link,
     /// A service.
     Service(ServiceId),
 }
@@ -36,6 +39,7 @@ impl Role {
             Self::Tap => 2,
             Self::Service(ServiceId::Bridge) => 3,
             Self::Service(ServiceId::Coordinator) => 4,
+            Self::Link => 5,
             Self::Service(ServiceId::Servo(robot)) => Self::FIRST_SERVO + robot as u64,
         }
     }
@@ -46,6 +50,7 @@ impl Role {
             2 => Some(Self::Tap),
             3 => Some(Self::Service(ServiceId::Bridge)),
             4 => Some(Self::Service(ServiceId::Coordinator)),
+            5 => Some(Self::Link),
             _ => code
                 .checked_sub(Self::FIRST_SERVO)
                 .filter(|robot| *robot < MAX_ROBOTS as u64)
@@ -59,6 +64,7 @@ impl fmt::Display for Role {
         match self {
             Self::Supervisor => f.pad("supervisor"),
             Self::Tap => f.pad("tap"),
+            Self::Link => f.pad("link"),
             Self::Service(service) => f.pad(&service.to_string()),
         }
     }
@@ -435,12 +441,23 @@ struct Header {
     operator: AtomicU64,
     /// When tick 0 began, by the machine's monotonic clock; 0 before, and in lockstep.
     origin_ns: AtomicU64,
+    /// When tick 0 began by the clock of the team, where that is on another host than the bridge's; else 0.
+    master_origin_ns: AtomicU64,
     /// Set when ticks are paced by the clock: the run goes on without those that are lost.
     is_paced: AtomicU32,
+    /// A [`ProcessIdentity`]: who drives.
+    driver: AtomicU64,
+    /// A [`Drive`].
+    drive: Mailbox<DRIVE_WORDS>,
+    /// A [`Push`].
+    push: Mailbox<PUSH_WORDS>,
 }
 
+const DRIVE_WORDS: usize = size_of::<Drive>() / size_of::<u64>();
+const PUSH_WORDS: usize = size_of::<Push>() / size_of::<u64>();
+
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikoshi8");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikosh10");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -474,10 +491,29 @@ impl Board {
     /// # Errors
     /// The file can't be made: no space, no rights, or there is one.
     pub fn create(directory: &Path, services: &[ServiceId], expects_tap: bool) -> Result<Self, BoardError> {
+        Self::create_for(directory, services, expects_tap, false)
+    }
+
+    /// The same for one host of several: with a place for its link, and with those services only that live there or
+    /// that those exchange frames with.
+    ///
+    /// # Errors
+    /// As [`Board::create`].
+    pub fn create_for_host(directory: &Path, services: &[ServiceId]) -> Result<Self, BoardError> {
+        Self::create_for(directory, services, false, true)
+    }
+
+    fn create_for(
+        directory: &Path,
+        services: &[ServiceId],
+        expects_tap: bool,
+        has_link: bool,
+    ) -> Result<Self, BoardError> {
         let path = directory.join(FILE);
         let io_error = |source| BoardError::Io { path: path.clone(), source };
         let roles: Vec<_> = [Role::Supervisor, Role::Tap]
             .into_iter()
+            .chain(has_link.then_some(Role::Link))
             .chain(services.iter().copied().map(Role::Service))
             .collect();
         let size = size_of::<Header>() + roles.len() * size_of::<Slot>();
@@ -600,6 +636,19 @@ impl Board {
         self.header().origin_ns.store(origin_ns, Ordering::Release);
     }
 
+    pub(crate) fn master_origin_ns(&self) -> Option<u64> {
+        Some(self.header().master_origin_ns.load(Ordering::Acquire)).filter(|origin_ns| *origin_ns != 0)
+    }
+
+    pub(crate) fn set_master_origin_ns(&self, origin_ns: u64) {
+        self.header().master_origin_ns.store(origin_ns, Ordering::Release);
+    }
+
+    /// How often "stop" was said here, modulo 256.
+    pub fn stops(&self) -> u64 {
+        operator::stops_of(self.header().operator.load(Ordering::Acquire))
+    }
+
     /// Asks all services to end. Their waits end within a moment.
     pub fn request_stop(&self) {
         self.header().stop.store(1, Ordering::Release);
@@ -618,13 +667,66 @@ impl Board {
 
     /// Lets the operator say something: the coordinator hears it at its next tick.
     pub fn say(&self, command: u64) {
-        let last = self.operator_word();
-        self.header().operator.store(operator::word_after(last, command), Ordering::Release);
+        let word = |last| Some(operator::word_after(last, command));
+        let said = self.header().operator.fetch_update(Ordering::AcqRel, Ordering::Acquire, word);
+        debug_assert!(said.is_ok(), "there is always a next word");
     }
 
-    /// What the operator has said last.
-    pub fn operator_word(&self) -> u64 {
-        self.header().operator.load(Ordering::Acquire)
+    /// What the operator says now, after it was heard to say `last`. What whoever drives says counts only if it is
+    /// whole, and made of numbers.
+    pub(crate) fn operator_input(&self, last: &OperatorInput) -> OperatorInput {
+        let word = self.header().operator.load(Ordering::Acquire);
+        let drive = self.header().drive.read().map(bytemuck::cast::<_, Drive>);
+        let push = self.header().push.read().map(bytemuck::cast::<_, Push>);
+        OperatorInput {
+            word,
+            drive: drive.filter(Drive::is_finite).unwrap_or(last.drive),
+            push: push.filter(Push::is_credible).unwrap_or(last.push),
+        }
+    }
+
+    /// Has the world disturbed from its next tick on. Returns the number by which the world says that it has heard.
+    /// One process does so at a time.
+    pub fn push(&self, target: u64, force_n: [f64; 3], ticks: u64) -> u64 {
+        let last: Push = self.header().push.read().map(bytemuck::cast).unwrap_or_default();
+        let number = last.number + 1;
+        self.header().push.write(&bytemuck::cast(Push { number, target, force_n, ticks }));
+        number
+    }
+
+    /// What whoever drives has said last.
+    pub(crate) fn drive(&self) -> Drive {
+        self.header().drive.read().map(bytemuck::cast).unwrap_or_default()
+    }
+
+    pub(crate) fn set_drive(&self, drive: &Drive) {
+        self.header().drive.write(&bytemuck::cast(*drive));
+    }
+
+    /// Who drives, or drove last.
+    pub(crate) fn driver(&self) -> Option<ProcessIdentity> {
+        ProcessIdentity::from_word(self.header().driver.load(Ordering::Acquire))
+    }
+
+    /// Lets this process drive, unless another living one does that it may not displace.
+    pub(crate) fn take_wheel(&self, own: ProcessIdentity, by_force: bool) -> Result<(), ProcessIdentity> {
+        let found = self.header().driver.load(Ordering::Acquire);
+        match ProcessIdentity::from_word(found) {
+            Some(driver) if !by_force && driver.is_alive() => return Err(driver),
+            _ => {}
+        }
+        // Of two who come at once one is first.
+        let taken =
+            self.header().driver.compare_exchange(found, own.to_word(), Ordering::AcqRel, Ordering::Acquire);
+        taken.map(drop).map_err(|word| ProcessIdentity::from_word(word).unwrap_or(own))
+    }
+
+    /// Lets others drive, if it was this process that did.
+    pub(crate) fn leave_wheel(&self, own: ProcessIdentity) {
+        let left =
+            self.header().driver.compare_exchange(own.to_word(), 0, Ordering::AcqRel, Ordering::Relaxed);
+        // Whoever has taken it over meanwhile keeps it.
+        let _ = left;
     }
 
     /// Tells all others that a process has taken another one's place. Returns the generation that it opens.
@@ -818,11 +920,11 @@ mod tests {
 
     #[test]
     fn roles_survive_the_wire() {
-        let roles = [Role::Supervisor, Role::Tap].into_iter();
+        let roles = [Role::Supervisor, Role::Tap, Role::Link].into_iter();
         for role in roles.chain(ServiceId::of_team(MAX_ROBOTS).map(Role::Service)) {
             assert_eq!(Role::from_wire(role.to_wire()), Some(role));
         }
-        for code in [0, 5, Role::FIRST_SERVO + MAX_ROBOTS as u64, u64::MAX] {
+        for code in [0, 6, Role::FIRST_SERVO + MAX_ROBOTS as u64, u64::MAX] {
             assert_eq!(Role::from_wire(code), None);
         }
     }

@@ -5,7 +5,7 @@ use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IceoryxPath, SemanticString};
 use std::io;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 /// Where POSIX shared memory lives on Linux; iceoryx2 has no other place.
@@ -92,6 +92,22 @@ impl Domain {
         files_with(&self.prefix)
     }
 
+    /// Takes its files in shared memory away from other users: iceoryx2 lets everybody write to one of them, a
+    /// counter of processes.
+    ///
+    /// # Errors
+    /// Shared memory can't be read.
+    pub fn close_to_others(&self) -> io::Result<()> {
+        for file in self.shared_memory_files()? {
+            match std::fs::metadata(&file).map(|metadata| metadata.mode() & 0o077) {
+                Ok(0) => {}
+                // One that is gone by now needs no closing.
+                _ => drop(std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600))),
+            }
+        }
+        Ok(())
+    }
+
     /// Removes its files in shared memory.
     ///
     /// # Errors
@@ -166,6 +182,17 @@ mod tests {
     fn a_path_that_is_too_long_is_rejected() {
         let run = PathBuf::from(format!("/{}", "long/".repeat(200)));
         assert!(matches!(Domain::of(&run).config(), Err(DomainError::UnusablePath(_))));
+    }
+
+    #[test]
+    fn other_users_have_no_part_in_a_domain() {
+        let domain = Domain::of(Path::new("/test/closed"));
+        let file = format!("{SHARED_MEMORY}/{}1.data", domain.prefix);
+        std::fs::write(&file, "x").expect("it is writable");
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o666)).expect("it is ours");
+        domain.close_to_others().expect("it is readable");
+        assert_eq!(std::fs::metadata(&file).expect("it is there").mode() & 0o777, 0o600);
+        domain.remove().expect("it can be removed");
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 use crate::allocations::allocations;
 use crate::board::{Board, BoardError, Role, Slot, State};
-use crate::pace::{Pace, now_ns, sleep_until, yield_until};
+use crate::pace::{Pace, now_ns, sleep_until, trimmed_origin_ns, yield_until};
 use crate::process::{ProcessIdentity, ProcessWatch};
+use crate::pulse;
 use crate::wait::{Bed, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
 use core::cell::{Cell, RefCell};
@@ -78,6 +79,8 @@ pub enum Entry {
     Replace,
     /// That of one who lives, once it is lost or falls behind.
     Standby,
+    /// Nobody's if there is one such, else as [`Entry::Standby`]: of two who come so, one is in charge.
+    Enlist,
 }
 
 impl Member {
@@ -90,12 +93,15 @@ impl Member {
         let board = Board::open(run)?;
         let index = board.index_of(role).ok_or(JoinError::NoSuchRole(role))?;
         let slot = &board.slots()[index];
-        if let Some(owner) = slot.living_owner().filter(|_| entry == Entry::Vacant) {
+        let owner = slot.living_owner();
+        if let Some(owner) = owner.filter(|_| entry == Entry::Vacant) {
             return Err(JoinError::Occupied { role, owner });
         }
+        let is_enlisted = entry == Entry::Enlist;
+        let entry = if is_enlisted && owner.is_some() { Entry::Standby } else { entry };
         // Of observers and supervisors there is no state to go on from.
         let is_first = entry != Entry::Standby && slot.epoch() == 0 || !matches!(role, Role::Service(_));
-        let member = Self {
+        let mut member = Self {
             role,
             slot: index,
             policy,
@@ -109,7 +115,12 @@ impl Member {
             board,
         };
         if is_first {
-            member.take_charge(Position::default(), None)?;
+            match member.take_charge(Position::default(), None) {
+                Err(JoinError::Occupied { .. }) if is_enlisted => {
+                    (member.is_first, member.entry) = (false, Entry::Standby);
+                }
+                taken => taken?,
+            }
         }
         Ok(member)
     }
@@ -166,7 +177,9 @@ impl Member {
     /// for room and waits until there is nobody. Returns the process that is to be fenced.
     pub(crate) fn wait_for_vacancy(&self, pace: Option<&Pace>) -> Result<Option<ProcessIdentity>, TickError> {
         let slot = self.slot();
-        if self.entry == Entry::Standby {
+        // While it was set up another may have come first.
+        let is_second = self.entry == Entry::Enlist && slot.living_owner().is_some();
+        if self.entry == Entry::Standby || is_second {
             return self.stand_by(pace);
         }
         if slot.living_owner().is_some() {
@@ -179,7 +192,8 @@ impl Member {
     fn stand_by(&self, pace: Option<&Pace>) -> Result<Option<ProcessIdentity>, TickError> {
         let slot = self.slot();
         let period_ns = pace.map_or(LEAST_LOOK_NS, |pace| pace.period_ns);
-        let patience_ticks = PATIENCE_NS.div_ceil(period_ns).max(PATIENCE_TICKS);
+        let lag_ticks = pace.map_or(0, Pace::lag_ticks);
+        let patience_ticks = PATIENCE_NS.div_ceil(period_ns).max(PATIENCE_TICKS) + lag_ticks;
         let world = self.slot_of(Role::Service(ServiceId::Bridge));
         let is_behind = || {
             let world = world.map_or(Position::default(), Slot::position);
@@ -213,9 +227,10 @@ impl Member {
         due_ns: Option<u64>,
         poll: impl Fn() -> Result<Option<()>, TickError>,
     ) -> Result<Option<()>, TickError> {
-        self.slot().porch.wait(self.policy, due_ns, poll, |_| match self.board.stop_is_requested() {
-            true => Err(TickError::Stopped),
-            false => Ok(()),
+        pulse::beat();
+        self.slot().porch.wait(self.policy, due_ns, poll, |_| {
+            pulse::beat();
+            if self.board.stop_is_requested() { Err(TickError::Stopped) } else { Ok(()) }
         })
     }
 
@@ -269,6 +284,7 @@ impl Member {
 
     /// Enters a phase. At the start of a tick it looks whether the run goes on, and with whom.
     pub(crate) fn begin_phase(&self, at: Position) -> Result<(), TickError> {
+        pulse::beat();
         if self.is_in_charge() {
             self.slot().set_position(at);
             self.slot().set_allocations(allocations());
@@ -323,6 +339,14 @@ impl Member {
         let now_ns = now_ns();
         match self.board.origin_ns() {
             Some(origin_ns) => {
+                let origin_ns = match self.board.master_origin_ns() {
+                    Some(master_ns) => {
+                        let trimmed_ns = trimmed_origin_ns(origin_ns, master_ns, pace.period_ns);
+                        self.board.set_origin_ns(trimmed_ns);
+                        trimmed_ns
+                    }
+                    None => origin_ns,
+                };
                 let start_ns = pace.start_ns(origin_ns, tick);
                 if now_ns > start_ns.saturating_add(pace.period_ns) {
                     self.board.set_origin_ns(origin_ns.saturating_add(now_ns - start_ns));
@@ -366,6 +390,7 @@ impl Member {
             poll()
         };
         bed.wait(self.policy, due_ns, poll, |woken| {
+            pulse::beat();
             if !self.is_in_charge() {
                 return Err(TickError::Fenced);
             }
@@ -501,5 +526,33 @@ impl Drop for Member {
         if !state.has_ended() && state != State::Retired {
             self.fail(&TickError::Aborted);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_who_enlist_one_is_in_charge_and_both_are_heard_to_live() {
+        let run = tempfile::tempdir().expect("a directory");
+        Board::create(run.path(), &[ServiceId::Bridge], false).expect("a board");
+        let enlist = || {
+            let role = Role::Service(ServiceId::Bridge);
+            Member::join(run.path(), role, WaitPolicy::default(), Entry::Enlist).expect("a place")
+        };
+        let (first, second) = (enlist(), enlist());
+        assert_eq!((first.epoch(), first.is_successor()), (1, false));
+        assert_eq!((second.epoch(), second.is_successor()), (0, true));
+        let before = pulse::beats();
+        first.begin_phase(Position { tick: 7, phase: 0 }).expect("it is in charge");
+        assert!(pulse::beats() > before);
+        assert_eq!(second.begin_phase(Position { tick: 7, phase: 0 }), Err(TickError::Fenced));
+        // Whoever is in charge stops: a wait of the other ends, and each look is a beat.
+        let before = pulse::beats();
+        second.board.request_stop();
+        assert_eq!(second.wait_for_vacancy(None), Err(TickError::Stopped));
+        assert!(pulse::beats() > before);
+        first.conclude();
     }
 }

@@ -29,6 +29,22 @@ pub(crate) fn yield_until(due_ns: u64) {
     }
 }
 
+/// By how much of a period a tick may be longer or shorter, for it to come nearer to the clock's.
+const TRIM: f64 = 0.01;
+
+/// When tick 0 is to have begun by the next tick, if it began at `own_ns` so far and by the clock of the team at
+/// `master_ns`: nearer to that by a hundredth of a period at most. So no tick is skipped, and none is much longer or
+/// shorter than another.
+pub(crate) fn trimmed_origin_ns(own_ns: u64, master_ns: u64, period_ns: u64) -> u64 {
+    let most_ns = (TRIM * period_ns as f64) as u64;
+    let nearer = own_ns.clamp(master_ns.saturating_sub(most_ns), master_ns.saturating_add(most_ns));
+    match own_ns.cmp(&master_ns) {
+        _ if nearer == own_ns => master_ns,
+        core::cmp::Ordering::Less => own_ns.saturating_add(most_ns),
+        _ => own_ns.saturating_sub(most_ns),
+    }
+}
+
 /// When the phases of one service are due.
 #[derive(Clone, Debug)]
 pub(crate) struct Pace {
@@ -63,6 +79,11 @@ impl Pace {
         Some(self.start_ns(origin_ns, at.tick).saturating_add(due_ns + patience_ns))
     }
 
+    /// How many ticks behind the world its service may be when all is well.
+    pub fn lag_ticks(&self) -> u64 {
+        self.due_ns.iter().flatten().max().unwrap_or(&0) / self.period_ns.max(1)
+    }
+
     /// When this tick begins.
     pub fn start_ns(&self, origin_ns: u64, tick: u64) -> u64 {
         origin_ns.saturating_add(tick.saturating_mul(self.period_ns))
@@ -73,6 +94,36 @@ impl Pace {
 mod tests {
     use super::*;
     use crate::Placement;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn ticks_come_nearer_to_the_clock_by_a_hundredth_at_most_and_none_is_skipped(
+            own_ns in 1_u64..1 << 62,
+            master_ns in 1_u64..1 << 62,
+            period_ns in 100_u64..1 << 40,
+        ) {
+            let trimmed = trimmed_origin_ns(own_ns, master_ns, period_ns);
+            let most_ns = period_ns / 100;
+            prop_assert!(trimmed.abs_diff(own_ns) <= most_ns);
+            let (before, after) = (own_ns.abs_diff(master_ns), trimmed.abs_diff(master_ns));
+            prop_assert_eq!(after, before.saturating_sub(most_ns));
+        }
+
+        #[test]
+        fn whatever_the_clocks_drift_within_a_hundredth_they_meet_and_stay_together(
+            start in -50_i64..50,
+            drift_ppm in -5000_i64..5000,
+        ) {
+            const PERIOD_NS: u64 = 5_000_000;
+            let (mut own, mut master) = (1_u64 << 40, (1_i64 << 40) + start * PERIOD_NS as i64 / 100);
+            for _ in 0..400 {
+                master += drift_ppm * PERIOD_NS as i64 / 1_000_000;
+                own = trimmed_origin_ns(own, master as u64, PERIOD_NS);
+            }
+            prop_assert!(own.abs_diff(master as u64) <= PERIOD_NS / 100);
+        }
+    }
 
     const PERIOD_NS: u64 = 5_000_000;
 

@@ -83,6 +83,27 @@ impl RealTime {
     }
 }
 
+impl RealTime {
+    /// Until [`RealTime::rush_again`] this process has no priority over others: while it sets itself up, no tick of
+    /// another on its core is to wait for it.
+    pub fn linger(&self) {
+        if self.fifo_priority.is_some() {
+            let ordinary = libc::sched_param { sched_priority: 0 };
+            // SAFETY: the parameter lives across the call, which only reads it; 0 is the calling thread. Giving up a
+            // priority is always granted.
+            unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &ordinary) };
+        }
+    }
+
+    /// Takes the priority again that was granted before.
+    pub fn rush_again(&self) {
+        if let Some(priority) = self.fifo_priority {
+            // Where it was not granted that has been said.
+            let _ = use_fifo_priority(priority);
+        }
+    }
+}
+
 fn pin_to(core: usize) -> Result<(), MissingRight> {
     let available = core_affinity::get_core_ids().unwrap_or_default();
     match available.iter().find(|id| id.id == core) {

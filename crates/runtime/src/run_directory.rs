@@ -8,6 +8,9 @@
 //!         board               who is where (see `Board`)
 //!         iox/                iceoryx2's own files
 //! ```
+//!
+//! Services that the system starts have theirs in /run/mikoshi, which is their user's. Their run is *kept*: no
+//! process holds it together, and it is there until it is removed.
 
 use crate::{Board, Domain};
 use rustix::fs::{FlockOperation, flock};
@@ -17,6 +20,10 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 const LOCK: &str = "lock";
+/// Marks a run that is there whether or not anybody takes part in it.
+const KEPT: &str = "kept";
+/// Where the runs of the system's services are.
+const SYSTEM_BASE: &str = "/run/mikoshi";
 
 /// Why a run has no directory.
 #[derive(Debug, thiserror::Error)]
@@ -43,14 +50,52 @@ pub struct RunDirectory {
 pub struct FoundRun {
     /// Its directory.
     pub path: PathBuf,
-    /// Whether its supervisor or any of its services still runs.
+    /// Whether its supervisor or any of its services still runs, or it is kept.
     pub alive: bool,
 }
 
 impl RunDirectory {
     /// Where the runs of this user are.
     pub fn default_base() -> PathBuf {
-        PathBuf::from(format!("/dev/shm/mikoshi-{}", rustix::process::getuid().as_raw()))
+        let uid = rustix::process::getuid().as_raw();
+        let is_ours = |metadata: std::fs::Metadata| metadata.is_dir() && metadata.uid() == uid;
+        match std::fs::symlink_metadata(SYSTEM_BASE).is_ok_and(is_ours) {
+            true => PathBuf::from(SYSTEM_BASE),
+            false => PathBuf::from(format!("/dev/shm/mikoshi-{uid}")),
+        }
+    }
+
+    /// Makes the directory of a run with this name under `base`, which is kept until [`Self::remove_kept`]. What one
+    /// of the same name has left is removed.
+    ///
+    /// # Errors
+    /// Processes of such a run still live; `base` can't be made, or is not ours alone.
+    pub fn keep(base: &Path, name: &str) -> Result<Self, RunDirectoryError> {
+        let (base, _base_lock) = enter(base)?;
+        let path = base.join(name);
+        let error = |source| RunDirectoryError { path: path.clone(), source };
+        if Board::open(&path).is_ok_and(|board| board.has_living_process()) {
+            return Err(error(io::Error::new(io::ErrorKind::AddrInUse, "is still carried out")));
+        }
+        remove(&path).map_err(error)?;
+        DirBuilder::new().mode(0o700).create(&path).map_err(error)?;
+        let lock = lock(&path, FlockOperation::NonBlockingLockExclusive)?;
+        File::create(path.join(KEPT)).map_err(error)?;
+        Ok(Self { path, is_removed: false, _lock: lock })
+    }
+
+    /// Removes a run that is kept, if there is one.
+    ///
+    /// # Errors
+    /// A file can't be removed.
+    pub fn remove_kept(path: &Path) -> Result<(), RunDirectoryError> {
+        remove(path).map_err(|source| RunDirectoryError { path: path.to_owned(), source })
+    }
+
+    /// Whether this run is there whether or not anybody takes part in it: who starts its processes is not its
+    /// supervisor.
+    pub fn is_kept(run: &Path) -> bool {
+        run.join(KEPT).exists()
     }
 
     /// Makes the directory of a new run under `base`, and locks it.
@@ -248,7 +293,7 @@ fn is_alive(run: &Path) -> bool {
         Ok(file) => flock(&file, FlockOperation::NonBlockingLockShared).is_err(),
         Err(_) => false,
     };
-    is_locked || Board::open(run).is_ok_and(|board| board.has_living_process())
+    is_locked || RunDirectory::is_kept(run) || Board::open(run).is_ok_and(|board| board.has_living_process())
 }
 
 fn remove(run: &Path) -> io::Result<()> {
@@ -331,6 +376,28 @@ mod tests {
         RunDirectory::adopt(&orphaned).expect_err("it has been adopted");
         drop(adopted);
         assert!(!orphaned.exists(), "it ended with its second supervisor");
+    }
+
+    #[test]
+    fn a_run_that_is_kept_needs_nobody_and_makes_room_for_the_next_of_its_name() {
+        let base = base();
+        let kept = RunDirectory::keep(base.path(), "team").expect("a run");
+        let path = kept.path().to_owned();
+        kept.leave_as_it_is();
+        assert_eq!(RunDirectory::clean_dead(base.path()).expect("nothing fails"), Vec::<PathBuf>::new());
+        assert!(RunDirectory::is_kept(&path) && RunDirectory::list(base.path()).expect("a list")[0].alive);
+
+        Board::create(&path, &[ServiceId::Bridge], false).expect("a board");
+        let role = Role::Service(ServiceId::Bridge);
+        let member = Member::join(&path, role, WaitPolicy::default(), Entry::Vacant).expect("a place");
+        let error = RunDirectory::keep(base.path(), "team").expect_err("somebody takes part in it");
+        assert!(error.to_string().contains("still carried out"), "{error}");
+        drop(member);
+        // Its process lives on: here that is the test's own.
+        RunDirectory::remove_kept(&path).expect("it can be removed");
+        RunDirectory::remove_kept(&path).expect("there is none");
+        RunDirectory::keep(base.path(), "team").expect("a new one").leave_as_it_is();
+        assert!(Board::open(&path).is_err());
     }
 
     #[test]

@@ -160,7 +160,8 @@ impl Position {
     }
 }
 
-/// No phase waits longer for its inputs than this share of a period.
+/// No phase waits longer for its inputs than this share of a period, unless what it says is used later than in the
+/// next tick: then half of that time is for what comes to it, and half for what goes from it.
 const LATEST_START: f64 = 0.9;
 
 /// Why a list of phases is not a schedule.
@@ -308,15 +309,17 @@ impl TickSchedule {
     }
 
     /// When a phase must start at the latest, in periods from the tick's beginning, so that it and all that
-    /// wait for it keep to their budgets; at most [`LATEST_START`].
+    /// wait for it keep to their budgets; at most [`LATEST_START`] and half the ticks after the next one in which what
+    /// it says is used.
     pub fn latest_start(&self, phase: &Phase) -> f64 {
         let Some(index) = self.phases.iter().position(|other| other == phase) else { return 0.0 };
         let mut latest = vec![1.0_f64; self.phases.len()];
         for index in (0..self.phases.len()).rev() {
             let phase = &self.phases[index];
+            let patience = self.oldest_use(phase).saturating_sub(1) as f64 / 2.0;
             let waits_for_it =
                 |input: &&Input| phase.outputs.iter().any(|output| output.topic == input.topic);
-            let mut end = 1.0_f64;
+            let mut end = 1.0 + patience;
             for (later, other) in self.phases.iter().enumerate() {
                 for input in other.inputs.iter().filter(waits_for_it) {
                     // Who comes earlier in the tick uses what is older.
@@ -327,7 +330,7 @@ impl TickSchedule {
                     end = end.min(latest[later]);
                 }
             }
-            latest[index] = (end - phase.budget).clamp(0.0, LATEST_START);
+            latest[index] = (end - phase.budget).clamp(0.0, LATEST_START + patience);
         }
         latest[index]
     }
@@ -555,6 +558,11 @@ mod tests {
         // The coordinator has until the next tick.
         assert_eq!(due(1, Call::Coordinate), 0.9);
         assert_eq!(due(1, Call::Sense), 0.15);
+        // Further away half the way is for what comes, half for what goes.
+        assert_eq!(due(2, Call::Coordinate), 1.4);
+        assert_eq!(due(6, Call::Coordinate), 3.4);
+        assert_eq!(due(6, Call::Act), 0.25);
+        assert_eq!(due(6, Call::Sense), 0.15);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use mikoshi_recording::DEFAULT_VIEW_HZ;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
@@ -14,7 +15,9 @@ Examples:
   mikoshi sweep config/sweeps/robust.toml
   mikoshi plan config/scenarios/hold.toml
   mikoshi status
+  mikoshi top
   mikoshi swap A
+  mikoshi drive
   mikoshi doctor --clean";
 
 const RUN_EXAMPLES: &str = "\
@@ -62,6 +65,22 @@ Exit status:
   2  there is no such run
   3  a fault of the system: the file can't be written";
 
+const WATCH_EXAMPLES: &str = "\
+Examples:
+  mikoshi view --web                                   (the only run there is, as a page)
+  mikoshi view runs/transport-0 --web
+  mikoshi view runs/transport-0 --save walk.rrd
+  mikoshi view                                         (in a window of `rerun`, which must be on the PATH)
+
+Shows robots, object, support polygons, zero moment points, forces of hands and references in 3D, and beside them
+internal forces, errors, margins and times, in Rerun. A run does not wait for those who look at it. Pages are served
+on this machine only, and fetch nothing from elsewhere. `make view` builds it.
+
+Exit status:
+  0  shown to the end, or up to Ctrl-C
+  2  there is no such run, or no window to show it in
+  3  a fault of the system: it was not built, the port is taken, the file can't be written";
+
 const REPLAY_EXAMPLES: &str = "\
 Examples:
   mikoshi replay runs/hold-0/run.mcap
@@ -88,6 +107,58 @@ next tick, and the new one goes on from there. In lockstep no tick is lost.
 Exit status:
   0  the new process is in charge
   2  it was refused, and nothing has changed: no such service, a setting that is wrong, or another state
+  3  a fault of the system";
+
+const DRIVE_EXAMPLES: &str = "\
+Examples:
+  mikoshi run config/scenarios/drive.toml --real-time   (in another terminal; in lockstep time would fly)
+  mikoshi drive
+  mikoshi drive --script walk.txt                       (or - for standard input)
+
+A script has lines of a time in seconds since driving began, by the run's clock, and an order:
+  0.0  move 0.05 0 0  0 0 0.02   ahead, left, up [m/s], and about these axes [rad/s]
+  5.0  squeeze 10                press harder [N]
+  8.0  halt
+  9.0  end
+and stop, resume, grasp, lift, lower, release. Behind # is a comment.
+
+Directions are the object's own. The coordinator bounds speeds, accelerations, heights and tilts, by the
+scenario's [operator.drive], and no faster than the slowest robot can follow. If this process ends or hangs, the
+object is at rest within operator.drive.timeout_s. What was said is in the run's log, and replays. One process
+drives at a time.
+
+Exit status:
+  0  somebody quit, the script or the run has ended
+  1  another process took over, or the run's supervisor is gone
+  2  no such run, one that nobody may drive, a script that is wrong, no terminal
+  3  a fault of the system
+  130, 143  interrupted, terminated";
+
+const PUSH_EXAMPLES: &str = "\
+Examples:
+  mikoshi push A --force 0,40,0 --for 0.2       (robot A, at its waist)
+  mikoshi push object --force 0,0,-30 --for 1
+
+The force acts at the body's centre of mass, in axes of the world, from the next tick on; it takes the place of what
+pushes the same body. It is in the log, and replays. A scenario has the same in [[world.pushes]].
+
+Exit status:
+  0  the world has heard of it; the tick is told
+  2  no such run or body, or too much force
+  3  a fault of the system";
+
+const SET_EXAMPLES: &str = "\
+Examples:
+  mikoshi set hybrid.loop_gain=0.04
+  mikoshi set hybrid.axes.0.reference=30 safety.hand_force_max_n=200
+
+All that is named changes in one tick, or nothing does: a coordinator with these settings gets ready and takes the
+old one's place. References of forces go to what is asked for within a second. What other processes read, too, can't
+be set: gait, balance, the world. It is in the log, and replays.
+
+Exit status:
+  0  in force; the tick is told
+  2  refused, and nothing has changed: a value that is wrong, or a key that can't change in the middle of a run
   3  a fault of the system";
 
 const SOAK_EXAMPLES: &str = "\
@@ -159,6 +230,25 @@ Examples:
 
 Exit status: 0 it can be used, 2 it can't, and what is missing is said, with the line of the key.";
 
+const INSTALL_EXAMPLES: &str = "\
+Examples:
+  sudo target/release/mikoshi install                       (below /usr/local, configuration in /etc/mikoshi)
+  target/release/mikoshi install --root pkg --prefix /usr   (as a package is made)
+  sudo systemctl enable --now mikoshi.target
+
+Configuration that is there already stays as it is.
+
+Exit status: 0 it is installed, 2 bad usage, 3 a program is missing or a file can't be written.";
+
+const UNINSTALL_EXAMPLES: &str = "\
+Examples:
+  sudo mikoshi uninstall              (configuration, results and the user stay)
+  sudo mikoshi uninstall --purge
+
+What came as a package goes as one: sudo apt purge mikoshi.
+
+Exit status: 0 it is gone, 2 bad usage, 3 a file can't be removed.";
+
 const SWEEP_EXAMPLES: &str = "\
 Examples:
   mikoshi sweep config/sweeps/robust.toml
@@ -171,6 +261,32 @@ Exit status:
   2  bad usage or configuration
   3  a fault of the system: a run without a result, no simulator
   130, 143  interrupted, terminated: finished runs stay";
+
+const COMPLETIONS_EXAMPLES: &str = "\
+Examples:
+  mikoshi completions bash > ~/.local/share/bash-completion/completions/mikoshi
+  mikoshi completions zsh > ~/.zfunc/_mikoshi
+  mikoshi completions fish > ~/.config/fish/completions/mikoshi.fish";
+
+const TOP_EXAMPLES: &str = "\
+Examples:
+  mikoshi top
+  mikoshi top --run 4711-0
+  mikoshi top --once                (one table, without a terminal)
+  mikoshi top --once --json
+
+Of each service: the process in charge and its epoch, how far it is, how fast, and for how long each phase of a
+tick worked and waited in the last second (median and 99 of 100). `miss` counts its results that came too late since
+watching began, and for the bridge ticks that began late. Margins, tilt and torque of a robot are the worst of the
+last second, as its own sensors tell.
+
+Keys: q quits, arrows scroll. The run does not notice who watches.
+
+Exit status:
+  0  the run has ended, or somebody quit
+  1  the supervisor ended
+  2  there is no such run, or no terminal
+  3  a fault of the system";
 
 /// A team of humanoid robots carries one object.
 #[derive(Debug, Parser)]
@@ -193,6 +309,9 @@ pub enum Command {
     /// Record the frames of a run that goes on, from now to its end
     #[command(after_help = RECORD_EXAMPLES)]
     Record(RecordArguments),
+    /// Look at a run that goes on or was recorded, in 3D and in plots
+    #[command(after_help = WATCH_EXAMPLES)]
+    View(WatchArguments),
     /// Execute the services of a recorded run anew, and compare what they say
     #[command(after_help = REPLAY_EXAMPLES)]
     Replay(ReplayArguments),
@@ -203,6 +322,15 @@ pub enum Command {
     Stop(OperatorArguments),
     /// Let the team go on after a stop, once nothing is wrong
     Resume(OperatorArguments),
+    /// Drive the object of a run, by keys or by a script
+    #[command(after_help = DRIVE_EXAMPLES)]
+    Drive(DriveArguments),
+    /// Push a robot or the object of a simulated run
+    #[command(after_help = PUSH_EXAMPLES)]
+    Push(PushArguments),
+    /// Change gains, limits and references of a run that goes on
+    #[command(after_help = SET_EXAMPLES)]
+    Set(SetArguments),
     /// Kill processes of a run at random, and compare it with the same run undisturbed
     #[command(after_help = SOAK_EXAMPLES)]
     Soak(SoakArguments),
@@ -223,10 +351,114 @@ pub enum Command {
     /// Check whether a robot's files can be used: frames, limits, inertias, drives, sensors, and how far it reaches
     #[command(after_help = CHECK_ROBOT_EXAMPLES)]
     CheckRobot(CheckRobotArguments),
+    /// Watch a run as it goes on: processes, their timing, robots, internal forces, faults
+    #[command(after_help = TOP_EXAMPLES)]
+    Top(TopArguments),
     /// List the runs of this machine and their processes
     Status(StatusArguments),
     /// Check whether this machine is fit to run, and say how to make it so
     Doctor(DoctorArguments),
+    /// Print what a shell needs to complete this command's words
+    #[command(after_help = COMPLETIONS_EXAMPLES)]
+    Completions(CompletionsArguments),
+    /// Write the manual pages of all commands
+    Man(ManArguments),
+    /// Install programs, systemd units, their user and a configuration on this machine
+    #[command(after_help = INSTALL_EXAMPLES)]
+    Install(InstallArguments),
+    /// Stop the team and its services, and take away what was installed
+    #[command(after_help = UNINSTALL_EXAMPLES)]
+    Uninstall(UninstallArguments),
+    /// What systemd's units call
+    #[command(hide = true, subcommand)]
+    Service(ServiceCommand),
+}
+
+impl Command {
+    /// Whether programs, not people, read what it says.
+    pub fn wants_json(&self) -> bool {
+        match self {
+            Self::Run(arguments) => arguments.json,
+            Self::Adopt(arguments) => arguments.json,
+            Self::Record(arguments) => arguments.json,
+            Self::View(arguments) => arguments.json,
+            Self::Replay(arguments) => arguments.json,
+            Self::Swap(arguments) => arguments.json,
+            Self::Stop(arguments) | Self::Resume(arguments) => arguments.json,
+            Self::Drive(arguments) => arguments.json,
+            Self::Push(arguments) => arguments.json,
+            Self::Set(arguments) => arguments.json,
+            Self::Soak(arguments) => arguments.json,
+            Self::Latency(arguments) => arguments.json,
+            Self::Report(arguments) => arguments.json,
+            Self::Render(arguments) => arguments.json,
+            Self::Sweep(arguments) => arguments.json,
+            Self::Plan(arguments) => arguments.json,
+            Self::CheckRobot(arguments) => arguments.json,
+            Self::Top(arguments) => arguments.json,
+            Self::Status(arguments) => arguments.json,
+            Self::Doctor(arguments) => arguments.json,
+            Self::Completions(_) | Self::Man(_) => false,
+            Self::Install(_) | Self::Uninstall(_) | Self::Service(_) => false,
+        }
+    }
+}
+
+/// `mikoshi install`.
+#[derive(Args, Debug)]
+pub struct InstallArguments {
+    /// Where programs and units go, as they will be seen
+    #[arg(long, value_name = "DIR", default_value = "/usr/local")]
+    pub prefix: PathBuf,
+    /// Install into this folder instead of the machine, as a package is made
+    #[arg(long, value_name = "DIR", default_value = "/")]
+    pub root: PathBuf,
+}
+
+/// `mikoshi uninstall`.
+#[derive(Args, Debug)]
+pub struct UninstallArguments {
+    /// Where it was installed
+    #[arg(long, value_name = "DIR", default_value = "/usr/local")]
+    pub prefix: PathBuf,
+    /// The folder into which it was installed
+    #[arg(long, value_name = "DIR", default_value = "/")]
+    pub root: PathBuf,
+    /// Remove the configuration, all results and the user, too
+    #[arg(long)]
+    pub purge: bool,
+}
+
+/// `mikoshi service`.
+#[derive(Debug, Subcommand)]
+pub enum ServiceCommand {
+    /// Make the run that the services take part in
+    Prepare(PrepareArguments),
+    /// Remove it
+    Clear,
+    /// Wait until the team goes
+    Await,
+    /// Stop the team, and wait until it stands
+    Stop,
+    /// Write down which services the scenario wants, as a generator of systemd
+    Generate {
+        /// Where to
+        folder: PathBuf,
+    },
+}
+
+/// `mikoshi service prepare`.
+#[derive(Args, Debug)]
+pub struct PrepareArguments {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub scenario: ScenarioArguments,
+    /// Which of the scenario's hosts this one is [default: the one of this name, if there are several]
+    #[arg(long, value_name = "NAME")]
+    pub host: Option<String>,
+    /// Wait for all inputs, however long they take, instead of pacing ticks by the clock
+    #[arg(long)]
+    pub lockstep: bool,
 }
 
 /// Which scenario, with which changes.
@@ -254,6 +486,15 @@ pub struct RunArguments {
     /// Pace ticks by the clock, and go on without what does not come in time
     #[arg(long, conflicts_with = "in_process")]
     pub real_time: bool,
+    /// Another program in the place of the simulator: a bridge to robots, or to another world
+    #[arg(long, value_name = "FILE", conflicts_with = "in_process")]
+    pub bridge: Option<PathBuf>,
+    /// Print summary.json instead of a table
+    #[arg(long, conflicts_with = "quiet")]
+    pub json: bool,
+    /// Show the run as a page from its first tick on, and leave it there until Ctrl-C (see `mikoshi view`)
+    #[arg(long, conflicts_with = "in_process")]
+    pub viewer: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub results: ResultsArguments,
@@ -292,6 +533,9 @@ pub struct ViewArguments {
 pub struct AdoptArguments {
     /// The run, as `mikoshi status` names it [default: the only one without a supervisor]
     pub run: Option<String>,
+    /// Print summary.json instead of a table
+    #[arg(long, conflicts_with = "quiet")]
+    pub json: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub results: ResultsArguments,
@@ -308,12 +552,40 @@ pub struct RecordArguments {
     /// Replace it if it is there
     #[arg(long)]
     pub force: bool,
+    /// Print the result as JSON
+    #[arg(long, conflicts_with = "quiet")]
+    pub json: bool,
     /// Errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub views: ViewArguments,
+}
+
+/// `mikoshi view`.
+#[derive(Args, Debug)]
+pub struct WatchArguments {
+    /// The log of a run or its folder, or a run that goes on, as `mikoshi status` names it [default: the only one]
+    pub run: Option<String>,
+    /// Serve a page on this machine, and open it where there is a display
+    #[arg(long)]
+    pub web: bool,
+    /// The page's port; its data is at the next one [default: 9090, or any if that is taken]
+    #[arg(long, value_name = "PORT", requires = "web")]
+    pub port: Option<u16>,
+    /// Write a file for Rerun instead of showing anything
+    #[arg(long, value_name = "FILE.RRD", conflicts_with = "web")]
+    pub save: Option<PathBuf>,
+    /// Replace it if it is there
+    #[arg(long, requires = "save")]
+    pub force: bool,
+    /// Say as JSON where the page or the file is
+    #[arg(long)]
+    pub json: bool,
+    /// How often a second of the run is shown
+    #[arg(long, value_name = "HZ", default_value_t = 25.0, value_parser = positive_rate)]
+    pub hz: f64,
 }
 
 /// `mikoshi replay`.
@@ -331,6 +603,9 @@ pub struct ReplayArguments {
     /// Put a value in place of the recorded run's
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub overrides: Vec<(String, String)>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `mikoshi swap`.
@@ -347,6 +622,9 @@ pub struct SwapArguments {
     /// Another build's program
     #[arg(long, value_name = "FILE")]
     pub program: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `mikoshi stop`, `mikoshi resume`.
@@ -355,6 +633,60 @@ pub struct OperatorArguments {
     /// The run, as `mikoshi status` names it [default: the only one]
     #[arg(long, value_name = "RUN")]
     pub run: Option<String>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi drive`.
+#[derive(Args, Debug)]
+pub struct DriveArguments {
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
+    /// Drive by a script, without a terminal; - reads standard input
+    #[arg(long, value_name = "FILE")]
+    pub script: Option<PathBuf>,
+    /// Drive though another process does, which then ends
+    #[arg(long)]
+    pub take_over: bool,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi push`.
+#[derive(Args, Debug)]
+pub struct PushArguments {
+    /// object, or the name of a robot
+    #[arg(value_name = "ROBOT|object")]
+    pub on: String,
+    /// How hard, along x, y and z of the world
+    #[arg(long = "force", value_name = "X,Y,Z", value_parser = three_numbers, allow_hyphen_values = true)]
+    pub force_n: [f64; 3],
+    /// For how many seconds of the run
+    #[arg(long = "for", value_name = "S")]
+    pub for_s: f64,
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi set`.
+#[derive(Args, Debug)]
+pub struct SetArguments {
+    /// Values in place of the run's
+    #[arg(value_name = "KEY=VALUE", value_parser = key_and_value, required = true)]
+    pub settings: Vec<(String, String)>,
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `mikoshi soak`.
@@ -376,6 +708,9 @@ pub struct SoakArguments {
     /// Where the results go [default: runs/soak-NAME-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long, conflicts_with = "quiet")]
+    pub json: bool,
     /// No table: errors and exit status only
     #[arg(long, short)]
     pub quiet: bool,
@@ -431,6 +766,9 @@ pub struct ReportArguments {
     /// Where the report goes [default: a folder in the first run's]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `mikoshi render`.
@@ -463,6 +801,9 @@ pub struct RenderArguments {
     /// Replace the file if it is there
     #[arg(long)]
     pub force: bool,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Where to look from.
@@ -518,6 +859,23 @@ pub struct CheckRobotArguments {
     /// A robot's configuration, or a URDF
     #[arg(value_name = "ROBOT.toml|URDF")]
     pub file: PathBuf,
+    /// Print it as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi top`.
+#[derive(Args, Debug)]
+pub struct TopArguments {
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
+    /// Watch for a second, print one table, and end; it needs no terminal
+    #[arg(long)]
+    pub once: bool,
+    /// Print it as JSON
+    #[arg(long, requires = "once")]
+    pub json: bool,
 }
 
 /// `mikoshi status`.
@@ -539,6 +897,21 @@ pub struct DoctorArguments {
     pub clean: bool,
 }
 
+/// `mikoshi completions`.
+#[derive(Args, Debug)]
+pub struct CompletionsArguments {
+    /// For which shell
+    pub shell: Shell,
+}
+
+/// `mikoshi man`.
+#[derive(Args, Debug)]
+pub struct ManArguments {
+    /// The folder for mikoshi.1, mikoshi-run.1 and so on; it is made if it is not there
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+}
+
 fn positive_rate(typed: &str) -> Result<f64, String> {
     let hz = typed.parse().ok().filter(|hz: &f64| (0.1..=1000.0).contains(hz));
     hz.ok_or_else(|| "expected a rate from 0.1 to 1000 Hz".to_owned())
@@ -555,6 +928,13 @@ fn width_and_height(typed: &str) -> Result<(u32, u32), String> {
 fn rate(typed: &str) -> Result<f64, String> {
     let hz = typed.parse().ok().filter(|hz: &f64| hz.is_finite() && *hz >= 0.0);
     hz.ok_or_else(|| "expected a rate in Hz, or 0".to_owned())
+}
+
+fn three_numbers(typed: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = typed.split(',').map(|number| number.trim().parse().ok()).collect();
+    let numbers: Option<[f64; 3]> = numbers.and_then(|numbers| numbers.try_into().ok());
+    let finite = numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite()));
+    finite.ok_or_else(|| "expected three numbers with commas between them".to_owned())
 }
 
 fn key_and_value(typed: &str) -> Result<(String, String), String> {

@@ -10,6 +10,10 @@ use std::process::{Command, Stdio};
 pub const IN_PROCESS: &str = "mikoshi-in-process";
 /// A service that computes nothing.
 pub const EMPTY: &str = "mikoshi-empty";
+/// What keeps cores awake.
+pub const AWAKE: &str = "mikoshi-awake";
+/// What shows a run. It is built apart.
+const VIEWER: &str = "mikoshi-view";
 /// What a program's exit status is when the loader can't find one of its libraries.
 const LOADER_FAILED: i32 = 127;
 
@@ -36,17 +40,29 @@ pub fn kind_of(service: ServiceId) -> &'static str {
 /// # Errors
 /// It is not there: [`Status::Fault`].
 pub fn find(name: &str) -> Result<PathBuf, Failure> {
-    let here = env::current_exe().map_err(Failure::fault)?;
-    find_in(here.parent().unwrap_or(Path::new("")), name)
+    find_in(&here()?, name, "make build")
 }
 
-fn find_in(folder: &Path, name: &str) -> Result<PathBuf, Failure> {
+/// The path of the program that shows a run.
+///
+/// # Errors
+/// As [`find`].
+pub fn find_viewer() -> Result<PathBuf, Failure> {
+    find_in(&here()?, VIEWER, "make view")
+}
+
+fn here() -> Result<PathBuf, Failure> {
+    let this = env::current_exe().map_err(Failure::fault)?;
+    Ok(this.parent().unwrap_or(Path::new("")).to_owned())
+}
+
+fn find_in(folder: &Path, name: &str, how: &str) -> Result<PathBuf, Failure> {
     let path = folder.join(name);
     match path.is_file() {
         true => Ok(path),
         false => Err(Failure {
             status: Status::Fault,
-            message: format!("{} is missing: run `make build`", path.display()),
+            message: format!("{} is missing: run `{how}`", path.display()),
         }),
     }
 }
@@ -89,7 +105,7 @@ mod tests {
     #[test]
     fn a_program_that_is_missing_is_named_with_the_way_to_get_it() {
         let folder = tempfile::tempdir().expect("a folder");
-        let failure = find_in(folder.path(), "mikoshi-bridge").expect_err("it is empty");
+        let failure = find_in(folder.path(), "mikoshi-bridge", "make build").expect_err("it is empty");
         assert_eq!(failure.status, Status::Fault);
         assert!(failure.message.ends_with("mikoshi-bridge is missing: run `make build`"));
     }

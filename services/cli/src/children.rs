@@ -342,11 +342,16 @@ impl Drop for Children {
 
 /// Starts a run whose every word goes to a new file, and which ends in order with the thread that calls this.
 pub(crate) fn start_run(mut command: Command, log: &Path) -> io::Result<Child> {
+    end_with_this_thread(&mut command, Signal::TERM);
+    spawn(command, File::create(log)?)
+}
+
+/// Has a process ended by this signal when the thread that starts it ends.
+pub(crate) fn end_with_this_thread(command: &mut Command, signal: Signal) -> &mut Command {
     let parent = getpid();
     // SAFETY: between fork and exec the closure only makes two system calls on plain values: it neither
     // allocates nor takes a lock.
-    unsafe { command.pre_exec(move || end_with(parent)) };
-    spawn(command, File::create(log)?)
+    unsafe { command.pre_exec(move || end_with(parent, signal)) }
 }
 
 /// A process of its own: it lives on without us.
@@ -356,8 +361,8 @@ fn spawn(mut command: Command, log: File) -> io::Result<Child> {
     command.process_group(0).spawn()
 }
 
-fn end_with(parent: Pid) -> io::Result<()> {
-    set_parent_process_death_signal(Some(Signal::TERM))?;
+fn end_with(parent: Pid, signal: Signal) -> io::Result<()> {
+    set_parent_process_death_signal(Some(signal))?;
     // It may have died before.
     match getppid() == Some(parent) {
         true => Ok(()),

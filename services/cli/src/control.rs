@@ -2,7 +2,7 @@
 //! directory, and one line back.
 
 use crate::failure::{Failure, Status};
-use crate::socket::listen;
+use crate::socket::{accept, listen};
 use crate::wall_clock::Stopwatch;
 use core::time::Duration;
 use mikoshi_runtime::{Board, RunDirectory};
@@ -19,7 +19,7 @@ const MAX_REQUEST_TIME: Duration = Duration::from_secs(1);
 const MAX_CLIENTS: usize = 8;
 
 /// What is asked for.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
     /// Another process takes a service's place.
@@ -32,6 +32,20 @@ pub enum Request {
         /// The program, if it is to be another one.
         #[serde(default)]
         program: Option<PathBuf>,
+    },
+    /// Something in the simulated world is pushed.
+    Push {
+        /// `object`, or the name of a robot.
+        on: String,
+        /// In the world.
+        force_n: [f64; 3],
+        /// For how long.
+        for_s: f64,
+    },
+    /// The coordinator goes on with other settings.
+    Set {
+        /// Keys and values in place of the run's.
+        set: Vec<(String, String)>,
     },
     /// The team stops, and stands.
     Stop,
@@ -80,8 +94,7 @@ impl Control {
     /// The next request, if there is a whole one. It never waits.
     pub fn next(&mut self) -> Option<(Request, Client)> {
         if self.clients.len() < MAX_CLIENTS
-            && let Ok((stream, _)) = self.listener.accept()
-            && stream.set_nonblocking(true).is_ok()
+            && let Some(stream) = accept(&self.listener)
         {
             self.clients.push(Client { stream, request: Vec::new(), since: Stopwatch::start() });
         }

@@ -19,15 +19,22 @@ pub enum Status {
     Signal(u8),
 }
 
+impl Status {
+    /// The exit status.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Met => 0,
+            Self::NotMet => 1,
+            Self::Usage => 2,
+            Self::Fault => 3,
+            Self::Signal(number) => 128_u8.saturating_add(number),
+        }
+    }
+}
+
 impl From<Status> for ExitCode {
     fn from(status: Status) -> Self {
-        Self::from(match status {
-            Status::Met => 0,
-            Status::NotMet => 1,
-            Status::Usage => 2,
-            Status::Fault => 3,
-            Status::Signal(number) => 128_u8.saturating_add(number),
-        })
+        Self::from(status.code())
     }
 }
 
@@ -49,6 +56,11 @@ impl Failure {
     /// A fault of the system.
     pub fn fault(error: impl Into<Box<dyn Error>>) -> Self {
         Self { status: Status::Fault, message: with_causes(&*error.into()) }
+    }
+
+    /// One line of JSON: `{"error": {"status", "message"}}`.
+    pub fn to_json(&self) -> String {
+        serde_json::json!({ "error": { "status": self.status.code(), "message": self.message } }).to_string()
     }
 
     /// The same with what was being done.
@@ -106,6 +118,12 @@ mod tests {
         assert_eq!(Failure::usage(told).message, "outer: cause");
         let untold = Outer { text: "outer", source: Cause };
         assert_eq!(Failure::fault(untold).message, "outer: cause");
+    }
+
+    #[test]
+    fn as_json_an_error_is_one_line_whatever_it_says() {
+        let failure = Failure::usage("a \"b\"\nc");
+        assert_eq!(failure.to_json(), r#"{"error":{"message":"a \"b\"\nc","status":2}}"#);
     }
 
     #[test]

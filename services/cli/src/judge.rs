@@ -50,6 +50,11 @@ fn judge(scenario: &Scenario, summary: &Summary) -> Judge {
     judge.internal_forces(observed, when, "N", limits.internal_after_3s_n, |row| row.after_3s_n);
     judge.internal_forces(observed, when, "Nm", limits.internal_after_3s_nm, |row| row.after_3s_nm);
     judge.internal_forces(observed, "from 3 s on", "N", limits.internal_peak_n, |row| row.peak_n);
+    let errors = "against their references";
+    let at_end = "against their references at the end";
+    judge.internal_forces(observed, errors, "N", limits.internal_error_peak_n, |row| row.error_peak_n);
+    judge.internal_forces(Some(rows), at_end, "N", limits.internal_error_end_n, |row| row.error_end_n);
+    judge.internal_forces(Some(rows), at_end, "Nm", limits.internal_error_end_nm, |row| row.error_end_nm);
     judge.internal_forces(Some(rows), "at the end", "N", limits.internal_end_n, |row| row.end_n);
     judge.internal_forces(Some(rows), "at the end", "Nm", limits.internal_end_nm, |row| row.end_nm);
 

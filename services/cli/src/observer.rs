@@ -11,12 +11,14 @@ use crate::prepare::Prepared;
 use crate::print::print_error;
 use crate::progress::Progress;
 use crate::stamps::Stamps;
+use crate::viewer::Viewer;
 use crate::wall_clock::Stopwatch;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
     Fault, Figures, Freshness, LatencyFigures, LogHash, Observation, Summary, Swap, Timing, WriteLogError,
 };
+use mikoshi_process::journal::{self, About, Severity};
 use mikoshi_recording::Recording;
 use mikoshi_runtime::Board;
 use std::path::{Path, PathBuf};
@@ -34,6 +36,8 @@ pub struct RunObserver {
     /// Why and from which tick on there is no log.
     log_failure: Option<String>,
     feed: Option<Feed>,
+    is_viewer_expected: bool,
+    viewer: Option<Viewer>,
     progress: Progress,
     stamps: Stamps,
     freshness: Freshness,
@@ -41,6 +45,7 @@ pub struct RunObserver {
     swaps: Vec<(ServiceId, Swap)>,
     stops: Stops,
     first_tick: Option<u64>,
+    heard_push: (u64, u64),
     ticks: u64,
     /// While all processes still work.
     last_counted_tick: u64,
@@ -70,13 +75,16 @@ impl RunObserver {
             world: out.world(),
             log_failure: None,
             feed: None,
+            is_viewer_expected: false,
+            viewer: None,
             progress: Progress::new(run.ticks, run.scenario.control_period_s, !arguments.quiet),
-            stamps: Stamps::new(run.scenario.clock, run.scenario.control_period_s),
+            stamps: Stamps::new(run.scenario.clock, run.scenario.wall_period_s()),
             freshness: Freshness::with_delay(run.scenario.coordination_delay_ticks),
             frames_lost: 0,
             swaps: vec![],
             stops: Stops::of(run),
             first_tick: None,
+            heard_push: (0, 0),
             ticks: 0,
             last_counted_tick: run.ticks.saturating_sub(WARM_UP_TICKS),
             clock: Stopwatch::start(),
@@ -87,7 +95,7 @@ impl RunObserver {
     #[must_use]
     pub fn measuring(mut self, prepared: &Prepared) -> Self {
         let scenario = &prepared.run.scenario;
-        let (period_s, delay_ticks) = (scenario.control_period_s, scenario.coordination_delay_ticks);
+        let (period_s, delay_ticks) = (scenario.wall_period_s(), scenario.coordination_delay_ticks);
         let figures = LatencyFigures::new(period_s, delay_ticks, WARM_UP_TICKS);
         self.latency = Some((figures, Costs::default()));
         self.figures = self.figures.filter(|_| !prepared.is_empty);
@@ -118,6 +126,27 @@ impl RunObserver {
         Ok(())
     }
 
+    /// From now on the run is to be shown once it can be.
+    pub fn expect_viewer(&mut self) {
+        self.is_viewer_expected = true;
+    }
+
+    /// Opens the viewer of the run in this directory, if one is expected.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn open_viewer(&mut self, run_directory: &Path) -> Result<(), Failure> {
+        if self.is_viewer_expected {
+            self.viewer = Some(Viewer::open(run_directory)?);
+        }
+        Ok(())
+    }
+
+    /// The viewer that was opened.
+    pub fn viewer(&mut self) -> Option<Viewer> {
+        self.viewer.take()
+    }
+
     /// Serves those that listen; `true` if a run that can wait should.
     pub fn serve_listeners(&mut self) -> bool {
         self.feed.as_mut().is_some_and(|feed| {
@@ -143,6 +172,10 @@ impl RunObserver {
         }
         self.stops.observe(observation.tick(), &observation.team_state.payload);
         self.freshness.observe(observation);
+        let number = observation.object_truth.payload.heard_push_number;
+        if number != self.heard_push.0 {
+            self.heard_push = (number, observation.tick().saturating_sub(1));
+        }
         self.first_tick.get_or_insert(observation.tick());
         self.ticks = observation.tick() + 1;
         self.progress.set_ticks(self.ticks);
@@ -156,6 +189,11 @@ impl RunObserver {
         let service = "recorder".to_owned();
         self.stops.faults.push(Fault { tick, service, robot: None, code: "log-lost".to_owned() });
         self.log_failure = Some(message);
+    }
+
+    /// Number of the last push that the world has heard of, and the tick in which it was.
+    pub fn heard_push(&self) -> (u64, u64) {
+        self.heard_push
     }
 
     /// Takes note of a process that was replaced.
@@ -229,6 +267,7 @@ impl RunObserver {
             robots: figures.robots,
             drift_between_robots_m: figures.drift_between_robots_m,
             minutes: figures.minutes,
+            load: figures.load,
             unintended_contact_ticks: figures.unintended_contact_ticks,
             timing: Timing {
                 ticks_held: self.freshness.ticks_held(),
@@ -282,7 +321,8 @@ impl Stops {
             let text = format!(
                 "{robot}'s {hand} hand lost the object in tick {tick}: {code}, {left} hands are left"
             );
-            print_error(&as_lines("warning", &text));
+            let about = About { tick: Some(tick), robot: Some(robot), fault: Some(code) };
+            journal::say(Severity::Warning, about, text);
             // A team that stops for it says so itself.
             if team.stop_cause == 0 {
                 let (service, robot) = ("coordinator".to_owned(), Some(robot.clone()));
@@ -299,7 +339,8 @@ impl Stops {
             (team.stop_robot as usize).checked_sub(1).and_then(|index| self.robots.get(index)).cloned();
         let code = stop_cause::name(team.stop_cause).to_owned();
         let of_robot = robot.as_ref().map_or_else(String::new, |robot| format!(", robot {robot}"));
-        print_error(&as_lines("warning", &format!("safe stop in tick {tick}: {code}{of_robot}")));
+        let about = About { tick: Some(tick), robot: robot.as_deref(), fault: Some(&code) };
+        journal::say(Severity::Warning, about, format_args!("safe stop in tick {tick}: {code}{of_robot}"));
         self.faults.push(Fault { tick, service: "coordinator".to_owned(), robot, code });
     }
 }

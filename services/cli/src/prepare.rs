@@ -7,6 +7,7 @@ use mikoshi_cooperation::{HybridLaw, TeamArms};
 use mikoshi_coordinator::{BuildCoordinatorError, build_hybrid_law, team_arms};
 use mikoshi_resolution::{resolve, tick_schedule};
 use mikoshi_runtime::TickSchedule;
+use std::path::PathBuf;
 
 /// A run, and what its services will build from it.
 pub struct Prepared {
@@ -20,6 +21,8 @@ pub struct Prepared {
     pub schedule: TickSchedule,
     /// Whether its services are to compute nothing.
     pub is_empty: bool,
+    /// What is the bridge in place of the simulator.
+    pub bridge: Option<PathBuf>,
 }
 
 /// Reads, checks and resolves a scenario.
@@ -55,7 +58,7 @@ fn assemble(run: RunSpec, tell: impl FnOnce(BuildCoordinatorError) -> Failure) -
     let arms = team_arms(&run).map_err(Failure::usage)?;
     let law = build_hybrid_law(&run).map_err(tell)?;
     let schedule = tick_schedule(&run).map_err(Failure::usage)?;
-    Ok(Prepared { run, arms, law, schedule, is_empty: false })
+    Ok(Prepared { run, arms, law, schedule, is_empty: false, bridge: None })
 }
 
 /// Says where what the law objects to was written.

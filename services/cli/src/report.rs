@@ -4,7 +4,7 @@ use crate::judge::is_judged_after_3s;
 use crate::table;
 use core::fmt::Write as _;
 use mikoshi_config::Scenario;
-use mikoshi_observation::{InternalSummary, ObjectSummary, RobotSummary, Summary};
+use mikoshi_observation::{InternalSummary, LoadSummary, ObjectSummary, RobotSummary, Summary};
 use std::path::Path;
 
 /// What the paper's fig. 14 shows of its simulation of section 4.3, read off the plots: components start
@@ -29,6 +29,9 @@ pub fn report(scenario: &Scenario, summary: &Summary, out: &Path) -> String {
     );
     text += "\nObject against its reference\n";
     text += &object_table(&summary.object);
+    if summary.load.mass_kg > 0.0 {
+        text += &load_line(&summary.load);
+    }
     text += "\nRobots\n";
     text += &robots_table(&summary.robots);
     text.push('\n');
@@ -87,6 +90,17 @@ fn object_table(object: &ObjectSummary) -> String {
             row("RMS", object.position_rms_m, object.attitude_rms_rad),
             row("peak", object.position_peak_m, object.attitude_peak_rad),
         ],
+    )
+}
+
+/// What is carried, as far as the team knows it.
+fn load_line(load: &LoadSummary) -> String {
+    let [x, y, z] = load.com_m.map(|part| 1e3 * part);
+    let [dx, dy, dz] = load.com_std_m.map(|part| 1e3 * part);
+    format!(
+        "load by the hands: {:.2} ± {:.2} kg since {:.1} s, centre of mass at {x:.0} ± {dx:.0}, {y:.0} ± {dy:.0}, \
+         {z:.0} ± {dz:.0} mm\n",
+        load.mass_kg, load.mass_std_kg, load.mass_stays_since_s
     )
 }
 

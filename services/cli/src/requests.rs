@@ -5,18 +5,31 @@ use crate::children::Children;
 use crate::control::{Client, Control, Request};
 use crate::observer::RunObserver;
 use crate::outcome::{label_of, service_named, swap_of};
-use crate::revise::revise;
+use crate::revise::{may_be_set, revise};
 use mikoshi_config::RunSpec;
-use mikoshi_ipc_types::{ServiceId, operator};
+use mikoshi_config::scenario::PushEvent;
+use mikoshi_ipc_types::{Push, ServiceId, operator};
 use mikoshi_resolution::{read_spec, write_spec};
-use mikoshi_runtime::Board;
+use mikoshi_runtime::{Board, RunDirectory};
 use std::path::{Path, PathBuf};
+
+/// Who follows gains, limits and references.
+const COORDINATOR: &str = "coordinator";
 
 /// Those of a run, and what has become of them so far.
 pub struct Requests {
     control: Control,
     run_directory: PathBuf,
     pending: Vec<Pending>,
+    push: Option<PendingPush>,
+}
+
+/// A push that the world has not heard of yet.
+struct PendingPush {
+    number: u64,
+    client: Client,
+    /// In words.
+    told: String,
 }
 
 /// A successor on its way.
@@ -27,6 +40,8 @@ struct Pending {
     client: Client,
     /// Its run, if it is another.
     revised: Option<RunSpec>,
+    /// What is in force then, if that was asked for and not the process.
+    settings: Option<String>,
 }
 
 impl Requests {
@@ -36,7 +51,7 @@ impl Requests {
     /// Nobody could ask.
     pub fn listen(run_directory: &Path) -> std::io::Result<Self> {
         let control = Control::listen(run_directory)?;
-        Ok(Self { control, run_directory: run_directory.to_owned(), pending: Vec::new() })
+        Ok(Self { control, run_directory: run_directory.to_owned(), pending: Vec::new(), push: None })
     }
 
     /// Whether a successor of this service is on its way.
@@ -54,10 +69,26 @@ impl Requests {
     ) {
         match self.control.next() {
             Some((Request::Swap { service, set, program }, client)) => {
-                match self.begin(run, board, children, &service, &set, program) {
+                match self.begin(run, board, children, &service, &set, program, |_, _| Ok(())) {
                     Ok((service, epoch, revised)) => {
-                        self.pending.push(Pending { service, epoch, client, revised });
+                        self.pending.push(Pending { service, epoch, client, revised, settings: None });
                     }
+                    Err(message) => client.refuse(message),
+                }
+            }
+            Some((Request::Set { set }, client)) => {
+                match self.begin(run, board, children, COORDINATOR, &set, None, may_be_set) {
+                    Ok((service, epoch, revised)) => {
+                        let told = set.iter().map(|(key, value)| format!("{key}={value}"));
+                        let settings = Some(told.collect::<Vec<_>>().join(", "));
+                        self.pending.push(Pending { service, epoch, client, revised, settings });
+                    }
+                    Err(message) => client.refuse(message),
+                }
+            }
+            Some((Request::Push { on, force_n, for_s }, client)) => {
+                match self.begin_push(run, board, &on, force_n, for_s) {
+                    Ok((number, told)) => self.push = Some(PendingPush { number, client, told }),
                     Err(message) => client.refuse(message),
                 }
             }
@@ -70,6 +101,10 @@ impl Requests {
                 client.done("the team is told to go on".to_owned());
             }
             None => {}
+        }
+        let (number, tick) = observer.heard_push();
+        if let Some(PendingPush { client, told, .. }) = self.push.take_if(|push| push.number == number) {
+            client.done(format!("{told} from tick {tick} on"));
         }
         let mut index = 0;
         while let Some(Pending { service, epoch, .. }) = self.pending.get(index) {
@@ -87,10 +122,13 @@ impl Requests {
                     children.dismiss(service);
                 }
                 Some((_, since)) if is_candidate => {
-                    let Pending { client, revised, .. } = self.pending.swap_remove(index);
+                    let Pending { client, revised, settings, .. } = self.pending.swap_remove(index);
                     children.promote(service);
                     let swap = swap_of(run, service, since.tick + 1, "swap".to_owned());
-                    client.done(format!("{} replaced in tick {}", label_of(run, service), swap.tick));
+                    client.done(match settings {
+                        Some(settings) => format!("{settings} from tick {} on", swap.tick),
+                        None => format!("{} replaced in tick {}", label_of(run, service), swap.tick),
+                    });
                     if let Some(revised) = revised {
                         observer.note_revision(&swap, service, &revised);
                     }
@@ -115,6 +153,42 @@ impl Requests {
         (1_u32..).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(0))
     }
 
+    fn begin_push(
+        &self,
+        run: &RunSpec,
+        board: &Board,
+        on: &str,
+        force_n: [f64; 3],
+        for_s: f64,
+    ) -> Result<(u64, String), String> {
+        let scenario = &run.scenario;
+        let target = scenario.push_target(on).ok_or_else(|| {
+            let names: Vec<_> = scenario.robots.iter().map(|member| member.name.as_str()).collect();
+            format!("found {on:?}, expected object or one of {}", names.join(", "))
+        })?;
+        let ticks = scenario.tick_at(for_s).max(1);
+        if !(for_s > 0.0 && for_s <= PushEvent::MAX_S) {
+            return Err(format!(
+                "--for: found {for_s}, expected more than 0, at most {} s",
+                PushEvent::MAX_S
+            ));
+        }
+        let push = Push { number: 0, target, force_n, ticks };
+        if !push.is_credible() {
+            return Err(format!(
+                "--force: found {force_n:?}, expected forces of at most {} N",
+                Push::MAX_FORCE_N
+            ));
+        }
+        if self.push.is_some() {
+            return Err("a push is on its way already".to_owned());
+        }
+        let [x, y, z] = force_n;
+        let told = format!("{on} is pushed with {x}, {y}, {z} N for {ticks} ticks");
+        Ok((board.push(target, force_n, ticks), told))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "what is asked for, of whom, and in which run")]
     fn begin(
         &mut self,
         run: &RunSpec,
@@ -123,8 +197,12 @@ impl Requests {
         name: &str,
         set: &[(String, String)],
         program: Option<PathBuf>,
+        may_be: impl FnOnce(&RunSpec, &RunSpec) -> Result<(), String>,
     ) -> Result<(ServiceId, u64, Option<RunSpec>), String> {
         let service = service_named(run, name)?;
+        if RunDirectory::is_kept(&self.run_directory) {
+            return Err(format!("{name} is started by systemd: restart its standby's unit, then its own"));
+        }
         if self.is_pending(service) {
             return Err(format!("a successor of {name} is on its way already"));
         }
@@ -137,8 +215,9 @@ impl Requests {
             set => {
                 let current = variant.spec.as_deref().map(read_spec).transpose();
                 let current = current.map_err(|error| error.to_string())?;
-                let revised =
-                    revise(current.as_ref().unwrap_or(run), set).map_err(|failure| failure.message)?;
+                let current = current.as_ref().unwrap_or(run);
+                let revised = revise(current, set).map_err(|failure| failure.message)?;
+                may_be(current, &revised)?;
                 let path = self.free_spec();
                 write_spec(&path, &revised).map_err(|error| error.to_string())?;
                 variant.spec = Some(path);

@@ -125,7 +125,9 @@ impl ServiceProcess {
                 None
             }
         };
-        self.ended = Some(Ended { status, is_success: false, by_us: true });
+        // It may have ended by itself meanwhile.
+        let is_success = status.is_some_and(|status| status.success());
+        self.ended = Some(Ended { status, is_success, by_us: !is_success });
     }
 
     /// The last lines that it wrote, indented; empty if it said nothing.

@@ -19,6 +19,19 @@ pub fn of_text<T: AsRef<str>>(titles: &[T], rows: impl IntoIterator<Item = Vec<S
     lines(&table(titles, rows))
 }
 
+/// A table of numbers for a screen: a blank between columns, and no line below the titles.
+pub fn dense<T: AsRef<str>>(titles: &[T], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut table = table(titles, rows);
+    table.load_style(TableStyle::new());
+    for (index, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, 1));
+        if index > 0 {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    lines(&table)
+}
+
 fn table<T: AsRef<str>>(titles: &[T], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
     let mut table = Table::new();
     // As wide as its content: a reader that is no terminal gets the same text.
@@ -41,5 +54,11 @@ mod tests {
         let table =
             of_numbers(&["row", "N"], [vec!["a".into(), "1.5".into()], vec!["b".into(), "10.5".into()]]);
         assert_eq!(table, " row      N\n────────────\n a      1.5\n b     10.5\n");
+    }
+
+    #[test]
+    fn a_dense_table_has_one_blank_between_columns() {
+        let table = dense(&["row", "N"], [vec!["a".into(), "1.5".into()], vec!["b".into(), "10.5".into()]]);
+        assert_eq!(table, "row    N\na    1.5\nb   10.5\n");
     }
 }

@@ -8,13 +8,14 @@ use mikoshi_ipc_types::{
     TeamCommand, stop_cause,
 };
 use mikoshi_observation::{Observation, TeamTap};
+use mikoshi_physics::BridgeParticipant;
 use mikoshi_resolution::{resolve, tick_schedule};
 use mikoshi_runtime::{
     Clock, ConnectError, InMemoryHub, InMemoryTransport, OperatorPort, Participant, Subscriber, TickError,
     Topic, Transport, run_in_one_thread,
 };
 use mikoshi_servo::ServoParticipant;
-use mikoshi_sim_bridge::BridgeParticipant;
+use mikoshi_sim_bridge::World;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::rc::Rc;
@@ -64,7 +65,7 @@ impl<P: ServicePayload> Subscriber<P> for DeafSubscriber<P> {
 
 fn participant(run: &RunSpec, service: ServiceId, ports: &Deaf) -> Box<dyn Participant> {
     match service {
-        ServiceId::Bridge => Box::new(BridgeParticipant::new(run, ports).expect("a bridge")),
+        ServiceId::Bridge => Box::new(BridgeParticipant::<_, World>::new(run, ports).expect("a bridge")),
         ServiceId::Coordinator => Box::new(CoordinatorParticipant::new(run, ports).expect("a coordinator")),
         ServiceId::Servo(robot) => Box::new(ServoParticipant::new(run, robot, ports).expect("a servo")),
     }
@@ -76,7 +77,7 @@ fn walk(team: &str, speed_m_s: f64, acceleration_m_s2: &str, operator: &str) -> 
     let travel = format!("[{}, 0.05, 0.0]", speed_m_s * 9.0);
     let overrides = [
         ("team", team),
-        ("safety.operator", operator),
+        ("operator.script", operator),
         ("duration_s", "11.0"),
         ("motion.start_s", "1.5"),
         ("motion.random.duration_s", "9.0"),

@@ -7,13 +7,14 @@ use mikoshi_ipc_types::{
     Frame, JointCommand, Payload, RobotState, Sensors, ServiceId, ServicePayload, TeamCommand, stop_cause,
 };
 use mikoshi_observation::{Observation, TeamTap};
+use mikoshi_physics::BridgeParticipant;
 use mikoshi_resolution::{resolve, tick_schedule};
 use mikoshi_runtime::{
     Clock, ConnectError, InMemoryHub, InMemoryTransport, Loan, OperatorPort, Participant, Publisher,
     Subscriber, TickError, Topic, Transport, run_in_one_thread,
 };
 use mikoshi_servo::ServoParticipant;
-use mikoshi_sim_bridge::BridgeParticipant;
+use mikoshi_sim_bridge::World;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::cell::RefCell;
@@ -106,7 +107,7 @@ impl<P: Payload> Loan<P> for SpoiltLoan<'_, P> {
 fn walk(operator: &str) -> RunSpec {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/transport.toml");
     let overrides = [
-        ("safety.operator", operator),
+        ("operator.script", operator),
         ("duration_s", "9.0"),
         ("motion.start_s", "1.5"),
         ("motion.random.duration_s", "6.0"),
@@ -119,7 +120,7 @@ fn walk(operator: &str) -> RunSpec {
 
 fn participant(run: &RunSpec, service: ServiceId, ports: &Spoilt) -> Box<dyn Participant> {
     match service {
-        ServiceId::Bridge => Box::new(BridgeParticipant::new(run, ports).expect("a bridge")),
+        ServiceId::Bridge => Box::new(BridgeParticipant::<_, World>::new(run, ports).expect("a bridge")),
         ServiceId::Coordinator => Box::new(CoordinatorParticipant::new(run, ports).expect("a coordinator")),
         ServiceId::Servo(robot) => Box::new(ServoParticipant::new(run, robot, ports).expect("a servo")),
     }

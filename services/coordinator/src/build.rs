@@ -36,6 +36,10 @@ pub enum BuildCoordinatorError {
     UnknownRow { found: String, expected: String },
     #[error("coordination.leader: there is no robot `{found}`; expected one of {expected}")]
     UnknownLeader { found: String, expected: String },
+    #[error(
+        "operator.drive.squeeze.row: found `{found}`, expected an internal force that is controlled along this axis"
+    )]
+    Squeeze { found: String },
     #[error("robot {robot}, hand {hand}: its pose in the object is not a pose")]
     HandPose { robot: String, hand: usize },
     #[error("{0}")]

@@ -15,6 +15,8 @@
 //!              Settling to Unloading when a hand lets go
 //! ```
 //!
+//! Where somebody drives, Waiting, Settling, Carrying and Unloading also wait for his word: grasp, lift, lower, release.
+//!
 //! A pure function of the phase and of what is seen: [`Job::next`]. What a phase asks of hands and object is
 //! a function of the phase and the tick.
 //!
@@ -24,7 +26,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::scenario::{Job as JobConfig, Scenario};
-use mikoshi_ipc_types::mode;
+use mikoshi_ipc_types::{mode, operator};
 
 /// The support bears the object when the hands bear less than this share of what they bore before.
 const TOUCHED_SHARE: f64 = 0.5;
@@ -58,6 +60,8 @@ pub(crate) struct Steps {
     creep_m: f64,
     /// Way in a tick.
     creep_step_m: f64,
+    /// Whether somebody says when it goes on.
+    by_word: bool,
 }
 
 /// Where the team is in its job. `since` is the first tick of the phase.
@@ -107,6 +111,8 @@ pub(crate) struct Seen {
     pub carried_n: f64,
     /// Size of their whole force \[N\].
     pub applied_n: f64,
+    /// The operator's last word about the job that was not followed yet; 0 if none.
+    pub asked: u64,
 }
 
 /// A [`Phase`] as words, for the state.
@@ -139,6 +145,7 @@ impl Job {
             lift_m,
             creep_m,
             creep_step_m: job.creep_m_s * scenario.control_period_s,
+            by_word: scenario.is_driven(),
         })
     }
 
@@ -158,8 +165,10 @@ impl Job {
             Self::Whole(steps) => steps,
         };
         let has_lasted = |begun: u64, ticks: u64| tick - begun.min(tick) >= ticks;
+        let awaited = self.awaited(&phase);
+        let is_told = awaited == 0 || awaited == seen.asked;
         match phase {
-            Phase::Waiting if tick >= steps.start => Phase::Approaching { since },
+            Phase::Waiting if is_told && tick >= steps.start => Phase::Approaching { since },
             Phase::Approaching { since: begun } if has_lasted(begun, steps.approach) && seen.in_reach => {
                 Phase::Grasping { since }
             }
@@ -170,9 +179,11 @@ impl Job {
             Phase::Grasping { since: begun } if has_lasted(begun, steps.grasp + steps.limit) => failed,
 
             phase if mode::is_hybrid(phase.mode()) && !seen.all_hold => failed,
-            Phase::Settling { since: begun } if has_lasted(begun, steps.settle) => Phase::Lifting { since },
+            Phase::Settling { since: begun } if is_told && has_lasted(begun, steps.settle) => {
+                Phase::Lifting { since }
+            }
             Phase::Lifting { since: begun } if has_lasted(begun, steps.lift) => Phase::Carrying { since },
-            Phase::Carrying { .. } if seen.motion_is_over && seen.team_stands => {
+            Phase::Carrying { .. } if is_told && seen.motion_is_over && seen.team_stands => {
                 Phase::Lowering { since, borne_n: seen.carried_n }
             }
             Phase::Lowering { borne_n, .. } if seen.carried_n < TOUCHED_SHARE * borne_n => {
@@ -182,16 +193,36 @@ impl Job {
                 failed
             }
             Phase::Unloading { since: begun, borne_n }
-                if has_lasted(begun, steps.unload) && seen.applied_n < UNLOADED_SHARE * borne_n =>
+                if is_told
+                    && has_lasted(begun, steps.unload)
+                    && seen.applied_n < UNLOADED_SHARE * borne_n =>
             {
                 Phase::Opening { since }
             }
-            Phase::Unloading { since: begun, .. } if has_lasted(begun, steps.unload + steps.limit) => failed,
+            Phase::Unloading { since: begun, .. }
+                if !steps.by_word && has_lasted(begun, steps.unload + steps.limit) =>
+            {
+                failed
+            }
 
             Phase::Opening { .. } if seen.none_holds => Phase::Withdrawing { since },
             Phase::Opening { since: begun } if has_lasted(begun, steps.limit) => failed,
             Phase::Withdrawing { since: begun } if has_lasted(begun, steps.approach) => Phase::Done,
             _ => phase,
+        }
+    }
+
+    /// The word that a phase waits for, whatever else it waits for; 0 if none.
+    pub(crate) fn awaited(&self, phase: &Phase) -> u64 {
+        match (self, phase) {
+            (Self::Whole(Steps { by_word: true, .. }), phase) => match phase {
+                Phase::Waiting => operator::GRASP,
+                Phase::Settling { .. } => operator::LIFT,
+                Phase::Carrying { .. } => operator::LOWER,
+                Phase::Unloading { .. } => operator::RELEASE,
+                _ => 0,
+            },
+            _ => 0,
         }
     }
 
@@ -366,6 +397,7 @@ mod tests {
         lift_m: 0.03,
         creep_m: 0.004,
         creep_step_m: 0.001,
+        by_word: false,
     };
     const WHOLE: Job = Job::Whole(STEPS);
     const NOTHING: Seen = Seen {
@@ -376,6 +408,7 @@ mod tests {
         team_stands: false,
         carried_n: 30.0,
         applied_n: 30.0,
+        asked: 0,
     };
     const HELD: Seen = Seen { all_hold: true, ..NOTHING };
 
@@ -395,6 +428,28 @@ mod tests {
         );
         assert_eq!(Job::Hold { hybrid_start: None }.next(Phase::Waiting, u64::MAX, &NOTHING), Phase::Waiting);
         assert!(job.closes_hands(&Phase::Waiting) && job.closes_hands(&carrying));
+    }
+
+    #[test]
+    fn where_somebody_drives_a_job_goes_on_when_he_says_so() {
+        let job = Job::Whole(Steps { by_word: true, ..STEPS });
+        let rested = Seen { motion_is_over: true, team_stands: true, applied_n: 0.1, ..HELD };
+        let (since, borne_n) = (10, 30.0);
+        for (phase, word, next) in [
+            (Phase::Waiting, operator::GRASP, mode::APPROACH),
+            (Phase::Settling { since }, operator::LIFT, mode::LIFT),
+            (Phase::Carrying { since }, operator::LOWER, mode::LOWER),
+            (Phase::Unloading { since, borne_n }, operator::RELEASE, mode::RELEASE),
+        ] {
+            assert_eq!(job.awaited(&phase), word);
+            for asked in 0..=operator::RELEASE {
+                let after = job.next(phase, 100_000, &Seen { asked, ..rested });
+                assert_eq!(after != phase, asked == word, "{phase:?} {asked}");
+                assert!(after == phase || after.mode() == next, "{phase:?} {after:?}");
+            }
+            assert_ne!(WHOLE.next(phase, 100_000, &rested), phase, "nobody drives");
+            assert_eq!(WHOLE.awaited(&phase), 0);
+        }
     }
 
     #[test]

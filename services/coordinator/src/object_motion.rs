@@ -1,5 +1,5 @@
-//! The object's reference motion: the operator's velocities, bounded by what the slowest robot can follow
-//! (Fig. 10b) and by accelerations, and their integral.
+//! The object's reference motion: the scenario's velocities, or those of whoever drives, bounded by what the slowest
+//! robot can follow (Fig. 10b) and by accelerations, and their integral.
 
 use crate::step_clock::step_timing;
 use bytemuck::{Pod, Zeroable};
@@ -14,15 +14,19 @@ const START_ROOM_M: f64 = 0.08;
 /// The same of its turn.
 const START_ROOM_RAD: f64 = 0.12;
 
-/// The operator's velocities over time.
+/// The scenario's velocities over time, and how velocities may change.
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectMotion {
     segments: Vec<Segment>,
     period_s: f64,
-    /// Largest change of velocity in a tick \[m/s\].
+    /// Largest change of velocity in a tick; of what is driven, largest loss \[m/s\].
     step_m_s: f64,
     /// The same of angular velocity \[rad/s\].
     step_rad_s: f64,
+    /// Largest gain of what is driven \[m/s\].
+    gain_m_s: f64,
+    /// The same of angular velocity \[rad/s\].
+    gain_rad_s: f64,
     /// Largest gain of velocity in a tick before a first foot has come down \[m/s\].
     start_step_m_s: f64,
     /// The same of angular velocity \[rad/s\].
@@ -62,20 +66,23 @@ impl ObjectMotion {
     /// Of this run.
     pub(crate) fn new(run: &RunSpec) -> Self {
         let period_s = run.scenario.control_period_s;
-        let accelerations = run.scenario.motion.as_ref();
         let first_landing_s = step_timing(&run.scenario).step(0) as f64 * period_s;
-        let step =
-            |of: fn(&mikoshi_config::scenario::Motion) -> f64| accelerations.map_or(0.0, of) * period_s;
-        let (step_m_s, step_rad_s) =
-            (step(|motion| motion.acceleration_m_s2), step(|motion| motion.angular_acceleration_rad_s2));
+        let [step_m_s, step_rad_s] =
+            run.scenario.object_braking().unwrap_or_default().map(|rate| rate * period_s);
+        let gain = run.scenario.operator.drive.as_ref();
+        let gain = gain.map(|drive| [drive.acceleration_m_s2, drive.angular_acceleration_rad_s2]);
+        let [gain_m_s, gain_rad_s] =
+            gain.map_or([step_m_s, step_rad_s], |gain| gain.map(|rate| rate * period_s));
         let to_go = |room: f64| 2.0 * room / (first_landing_s * first_landing_s) * period_s;
         Self {
             segments: run.motion.clone(),
             period_s,
             step_m_s,
             step_rad_s,
-            start_step_m_s: step_m_s.min(to_go(START_ROOM_M)),
-            start_step_rad_s: step_rad_s.min(to_go(START_ROOM_RAD)),
+            gain_m_s,
+            gain_rad_s,
+            start_step_m_s: gain_m_s.min(to_go(START_ROOM_M)),
+            start_step_rad_s: gain_rad_s.min(to_go(START_ROOM_RAD)),
         }
     }
 
@@ -110,6 +117,28 @@ impl ObjectMotion {
             twist: twist.to_array(),
             path_time_s: state.path_time_s + self.period_s * speed_share * pace.min(turning_pace),
         };
+        Some(X_WA)
+    }
+
+    /// The same for an object that is driven: towards `wanted`, within the limits that its driver has. It loses what it
+    /// has too much before it gains anything.
+    pub(crate) fn follow(
+        &self,
+        state: &mut ObjectMotionState,
+        wanted: &Twist<World>,
+        feet_follow: bool,
+    ) -> Option<Pose<World, Object>> {
+        let X_WA = Pose::<World, Object>::from_array(&state.pose)?;
+        let last = state.twist();
+        let start = |gain: f64, start: f64| if feet_follow { gain } else { start };
+        let gain_m_s = start(self.gain_m_s, self.start_step_m_s);
+        let gain_rad_s = start(self.gain_rad_s, self.start_step_rad_s);
+        let twist = Twist::new(
+            steered(&last.linear, &wanted.linear, self.step_m_s, gain_m_s),
+            steered(&last.angular, &wanted.angular, self.step_rad_s, gain_rad_s),
+        );
+        let X_WA = X_WA.displaced(&(twist * self.period_s));
+        (state.pose, state.twist) = (X_WA.to_array(), twist.to_array());
         Some(X_WA)
     }
 
@@ -152,6 +181,16 @@ fn change(from: &Vector3<f64>, target: &Vector3<f64>, step: f64, gain: f64) -> (
     (next, pace)
 }
 
+/// The velocity after a tick in which it may lose `step`, and gain `gain`. What `target` has no use for is lost first.
+fn steered(from: &Vector3<f64>, target: &Vector3<f64>, step: f64, gain: f64) -> Vector3<f64> {
+    let kept = match from.try_normalize(0.0) {
+        Some(along) => along * target.dot(&along).clamp(0.0, from.norm()),
+        None => *from,
+    };
+    let next = towards(from, &kept, step);
+    if next == kept { towards(&next, target, gain) } else { next }
+}
+
 /// `target`, or as far towards it as one step goes.
 fn towards(from: &Vector3<f64>, target: &Vector3<f64>, step: f64) -> Vector3<f64> {
     let way = target - from;
@@ -173,6 +212,8 @@ mod tests {
             period_s: 0.005,
             step_m_s: MOTION_STEP,
             step_rad_s: MOTION_STEP,
+            gain_m_s: 0.2 * MOTION_STEP,
+            gain_rad_s: 0.2 * MOTION_STEP,
             start_step_m_s: 0.1 * MOTION_STEP,
             start_step_rad_s: 0.1 * MOTION_STEP,
         }
@@ -226,6 +267,30 @@ mod tests {
         }
         assert_eq!(state.twist, [0.0; 6]);
         assert!((state.pose[0] - 0.2).abs() < 2e-3, "{:?}", state.pose);
+    }
+
+    #[test]
+    fn what_is_driven_brakes_faster_than_it_gains_and_before_it_does() {
+        let (motion, mut state) = (motion(), ObjectMotionState::at_rest(&Pose::identity()));
+        let to = |x, y| Twist::new(Vector3::new(x, y, 0.0), Vector3::zeros());
+        let mut ticks = |wanted: Twist<World>| {
+            let mut ticks = 0;
+            while state.twist() != wanted {
+                let last = state.twist().linear;
+                motion.follow(&mut state, &wanted, true).expect("a pose");
+                let (lost, gained) = (last - state.twist().linear, state.twist().linear.norm() - last.norm());
+                assert!(lost.norm() < 1.2 * MOTION_STEP + 1e-12 && gained < 0.2 * MOTION_STEP + 1e-12);
+                ticks += 1;
+                assert!(ticks < 10_000, "{wanted:?}");
+            }
+            ticks
+        };
+        assert_eq!(ticks(to(0.1, 0.0)), 200);
+        assert_eq!(ticks(to(0.0, 0.0)), 40);
+        assert_eq!(ticks(to(0.1, 0.0)), 200);
+        assert!((239..=241).contains(&ticks(to(-0.1, 0.0))), "back");
+        assert!((239..=241).contains(&ticks(to(0.0, 0.1))), "aside");
+        assert_eq!(state.path_time_s, 0.0);
     }
 
     #[test]

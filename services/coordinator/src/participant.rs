@@ -82,7 +82,7 @@ impl<T: Transport> CoordinatorParticipant<T> {
                 Err(error) => return Err(error),
             }
         }
-        self.state.hear_operator(self.operator.word());
+        self.state.hear_operator(&self.operator.hear(&self.state.heard_of_operator()));
         let robots = self.robot_states.iter();
         let outputs = of_tick(&mut self.outputs, tick)?;
         self.coordinator

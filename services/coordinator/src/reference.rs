@@ -15,6 +15,8 @@ const RAMP_S: f64 = 1.0;
 pub(crate) struct References {
     rows: Vec<RowReference>,
     ramp_ticks: f64,
+    /// Tells these references of forces from others.
+    fingerprint: u64,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,7 +40,17 @@ impl References {
             };
             target[exception.axis as usize] = exception.reference;
         }
-        Ok(Self { rows, ramp_ticks: RAMP_S / scenario.control_period_s })
+        let forces = rows.iter().flat_map(|row| row.force.iter());
+        // FNV-1a, by words.
+        let fingerprint = forces.fold(0xcbf2_9ce4_8422_2325_u64, |hash, force| {
+            (hash ^ force.to_bits()).wrapping_mul(0x0000_0100_0000_01b3)
+        });
+        Ok(Self { rows, ramp_ticks: RAMP_S / scenario.control_period_s, fingerprint })
+    }
+
+    /// Differs from that of references of other forces.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        self.fingerprint
     }
 
     /// Fills in h_r and z_r for an object that shall be at `X_WA_ref`, so many ticks after control started, and after it
@@ -54,7 +66,7 @@ impl References {
         position: &mut GeneralizedPosition,
     ) {
         let share = smooth_step(ticks as f64 / self.ramp_ticks);
-        let force_share = smooth_step(formed_ticks as f64 / self.ramp_ticks);
+        let force_share = self.share_in_force(formed_ticks);
         let mut rows = self.rows.iter().zip(force_start);
         if let Some((object, start)) = rows.next() {
             force.external = between(start, &object.force, force_share);
@@ -70,6 +82,11 @@ impl References {
 }
 
 impl References {
+    /// To which part references are in force, so many ticks after the team was last formed.
+    pub(crate) fn share_in_force(&self, formed_ticks: u64) -> f64 {
+        smooth_step(formed_ticks as f64 / self.ramp_ticks)
+    }
+
     /// How far the object's reference is still off, so many ticks after it was off by `off_start`.
     pub(crate) fn off_after(&self, ticks: u64, off_start: &[f64; 6]) -> Twist<World> {
         Twist::from_array(off_start) * (1.0 - smooth_step(ticks as f64 / self.ramp_ticks))
@@ -83,7 +100,7 @@ fn between<F: CoordinateFrame>(start: &[f64; 6], target: &Vector6<f64>, share: f
 }
 
 /// 3x² − 2x³ within 0 and 1: it starts and ends at rest.
-fn smooth_step(x: f64) -> f64 {
+pub(crate) fn smooth_step(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }

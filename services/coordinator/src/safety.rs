@@ -12,9 +12,10 @@
 //! Where what is measured can't be believed any more, they do so without force control. What went wrong first is
 //! remembered.
 
+use crate::operator::Says;
 use bytemuck::{Pod, Zeroable};
-use mikoshi_config::scenario::{OperatorWord, Safety as SafetyConfig, Scenario};
-use mikoshi_ipc_types::{MAX_ROBOTS, PoseWire, RobotState, flag, operator, stop_cause};
+use mikoshi_config::scenario::{Safety as SafetyConfig, Scenario};
+use mikoshi_ipc_types::{MAX_ROBOTS, PoseWire, RobotState, flag, stop_cause};
 use mikoshi_spatial::{Hand, Pose, World};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -27,8 +28,6 @@ const PATIENCE_TICKS: u64 = 5;
 pub(crate) struct Safety {
     limits: SafetyConfig,
     torque_ticks: u64,
-    /// What the scenario's operator says, by tick.
-    script: Vec<(u64, u64)>,
 }
 
 /// What is remembered between ticks.
@@ -39,8 +38,6 @@ pub(crate) struct SafetyState {
     pub cause: u64,
     /// Whose fault that is: the robot plus one.
     pub robot: u64,
-    /// The operator's last word.
-    pub operator_word: u64,
     /// Not 0 where the team is stopped and its hands' wrenches mean nothing to it any more.
     blind: u64,
     /// For how many ticks each cause has been there, by robot.
@@ -57,7 +54,7 @@ unsafe impl Pod for SafetyState {}
 
 impl Default for SafetyState {
     fn default() -> Self {
-        Self { cause: 0, robot: 0, operator_word: 0, blind: 0, lasted: [[0; CAUSES]; MAX_ROBOTS] }
+        Self { cause: 0, robot: 0, blind: 0, lasted: [[0; CAUSES]; MAX_ROBOTS] }
     }
 }
 
@@ -86,27 +83,17 @@ impl Safety {
     /// As the scenario has it.
     pub(crate) fn new(scenario: &Scenario) -> Self {
         let limits = scenario.safety.clone();
-        let say = |says| match says {
-            OperatorWord::Stop => operator::STOP,
-            OperatorWord::Resume => operator::RESUME,
-        };
-        let script = limits.operator.iter().map(|event| (scenario.tick_at(event.at_s), say(event.says)));
-        Self {
-            torque_ticks: scenario.tick_at(limits.torque_limit_s).max(1),
-            script: script.collect(),
-            limits,
-        }
+        Self { torque_ticks: scenario.tick_at(limits.torque_limit_s).max(1), limits }
     }
 
     /// One tick: what robots say of themselves, each with the set of its hands that take part; whether
-    /// nobody steps; and what the operator has said last.
+    /// nobody steps; and what the operator says.
     pub(crate) fn look<'a>(
         &self,
         state: &mut SafetyState,
-        tick: u64,
         robots: impl Iterator<Item = (&'a RobotState, u64)>,
         stands: bool,
-        operator_word: u64,
+        says: Says,
     ) {
         let mut first = None;
         for (index, ((robot, hands), lasted)) in robots.zip(&mut state.lasted).enumerate() {
@@ -122,18 +109,12 @@ impl Safety {
                 }
             }
         }
-        let heard = core::mem::replace(&mut state.operator_word, operator_word) != operator_word;
-        let said = heard.then(|| operator::command_of(operator_word));
-        let mut says =
-            self.script.iter().filter(|(at, _)| *at == tick).map(|(_, command)| *command).chain(said);
-        if first.is_none() && says.clone().any(|command| command == operator::STOP) {
+        if first.is_none() && says.stop {
             first = Some((stop_cause::OPERATOR, 0));
         }
         match first {
             Some((cause, robot)) if !state.is_stopped() => (state.cause, state.robot) = (cause, robot),
-            None if stands && says.any(|command| command == operator::RESUME) => {
-                (state.cause, state.robot, state.blind) = (0, 0, 0);
-            }
+            None if stands && says.resume => (state.cause, state.robot, state.blind) = (0, 0, 0),
             _ => {}
         }
     }
@@ -196,9 +177,13 @@ fn tilt(robot: &RobotState) -> f64 {
 mod tests {
     use super::*;
 
+    const SILENCE: Says = Says { stop: false, resume: false };
+    const STOP: Says = Says { stop: true, resume: false };
+    const RESUME: Says = Says { stop: false, resume: true };
+
     fn safety() -> Safety {
         let limits = SafetyConfig::default();
-        Safety { limits, torque_ticks: 100, script: vec![(50, operator::STOP), (60, operator::RESUME)] }
+        Safety { limits, torque_ticks: 100 }
     }
 
     fn well() -> RobotState {
@@ -218,8 +203,7 @@ mod tests {
             if tick >= 10 {
                 spoil(&mut robots[1]);
             }
-            // Past what the script says.
-            safety.look(&mut state, 1000 + tick, robots.iter().map(|robot| (robot, 0b11)), true, 0);
+            safety.look(&mut state, robots.iter().map(|robot| (robot, 0b11)), true, SILENCE);
             state.is_stopped().then_some((tick, state.cause, state.robot))
         })
     }
@@ -257,46 +241,34 @@ mod tests {
             if tick % PATIENCE_TICKS != 0 {
                 robot.zmp_margin_m = -1.0;
             }
-            safety.look(&mut state, tick, core::iter::once((&robot, 0b11)), true, 0);
+            safety.look(&mut state, core::iter::once((&robot, 0b11)), true, SILENCE);
             assert!(!state.is_stopped());
         }
     }
 
     #[test]
-    fn the_operator_stops_the_team_and_lets_it_go_on_by_script_or_by_word() {
+    fn the_operator_stops_the_team_and_lets_it_go_on() {
         let (safety, mut state) = (safety(), SafetyState::default());
-        let look = |state: &mut SafetyState, tick, robot: &RobotState, word| {
-            safety.look(state, tick, core::iter::once((robot, 0b11)), true, word);
+        let mut look = |says| {
+            safety.look(&mut state, core::iter::once((&well(), 0b11)), true, says);
             state.cause
         };
-        for tick in 0..100 {
-            let is_stopped = (50..60).contains(&tick);
-            let expected = if is_stopped { stop_cause::OPERATOR } else { 0 };
-            assert_eq!(look(&mut state, tick, &well(), 0), expected, "tick {tick}");
-        }
-        let stop = operator::word_after(0, operator::STOP);
-        let resume = operator::word_after(stop, operator::RESUME);
-        assert_eq!(look(&mut state, 100, &well(), stop), stop_cause::OPERATOR);
-        assert_eq!(look(&mut state, 101, &well(), stop), stop_cause::OPERATOR);
-        assert_eq!(look(&mut state, 102, &well(), resume), 0);
-        assert_eq!(look(&mut state, 103, &well(), resume), 0, "a word is heard once");
-        assert_eq!(look(&mut state, 104, &well(), operator::word_after(resume, operator::STOP)), 1);
+        assert_eq!([SILENCE, STOP, SILENCE, RESUME, SILENCE].map(&mut look), [0, 1, 1, 0, 0]);
+        let both = Says { stop: true, resume: true };
+        assert_eq!(look(both), stop_cause::OPERATOR, "a stop counts more");
     }
 
     #[test]
     fn nobody_goes_on_while_something_is_wrong() {
         let (safety, mut state) = (safety(), SafetyState::default());
         let fallen = RobotState { zmp_margin_m: -0.1, ..well() };
-        let mut word = 0;
-        for tick in 1000..1020 {
-            safety.look(&mut state, tick, core::iter::once((&fallen, 0b11)), true, word);
-            word = operator::word_after(word, operator::RESUME);
+        for _ in 0..20 {
+            safety.look(&mut state, core::iter::once((&fallen, 0b11)), true, RESUME);
         }
         assert_eq!((state.cause, state.robot), (stop_cause::BALANCE, 1));
-        safety.look(&mut state, 1020, core::iter::once((&well(), 0b11)), false, word);
+        safety.look(&mut state, core::iter::once((&well(), 0b11)), false, RESUME);
         assert!(state.is_stopped(), "it still steps");
-        word = operator::word_after(word, operator::RESUME);
-        safety.look(&mut state, 1021, core::iter::once((&well(), 0b11)), true, word);
+        safety.look(&mut state, core::iter::once((&well(), 0b11)), true, RESUME);
         assert!(!state.is_stopped());
     }
 
@@ -305,8 +277,8 @@ mod tests {
         let (safety, mut state) = (safety(), SafetyState::default());
         let mut robot = well();
         robot.hand_wrench[1][2] = -301.0;
-        for tick in 1000..1020 {
-            safety.look(&mut state, tick, core::iter::once((&robot, 0b01)), true, 0);
+        for _ in 0..20 {
+            safety.look(&mut state, core::iter::once((&robot, 0b01)), true, SILENCE);
         }
         assert!(!state.is_stopped());
     }
@@ -318,8 +290,7 @@ mod tests {
         assert!(!state.is_blind());
         state.stop(stop_cause::TOO_FEW_HANDS, 0, true);
         assert_eq!((state.cause, state.robot, state.is_blind()), (stop_cause::SLIP, 2, true));
-        let resume = operator::word_after(0, operator::RESUME);
-        safety.look(&mut state, 1000, core::iter::once((&well(), 0b11)), true, resume);
+        safety.look(&mut state, core::iter::once((&well(), 0b11)), true, RESUME);
         assert!(!state.is_stopped() && !state.is_blind());
     }
 

@@ -47,6 +47,7 @@ impl Wishes {
                 ready: is(flag::READY_TO_STEP),
                 first_swing: if is(flag::LEFT_FIRST) { Side::Left } else { Side::Right },
                 urgency: robot.step_urgency,
+                land_in_ticks: robot.land_in_ticks,
             };
             all.robots += 1;
             all.speed_share = all.speed_share.min(robot.speed_share);

@@ -5,8 +5,10 @@ use crate::grasp::GraspCompliance;
 use crate::grips::{self, GripState, Grips};
 use crate::job::{Job, Phase, PhaseWords, Seen};
 use crate::leading::{Leading, LeadingState};
+use crate::load::{Holding, Load, LoadScratch, LoadState};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::odometry::{self, OdometryFrames, OdometryState};
+use crate::operator::{Operator, OperatorState};
 use crate::reference::References;
 use crate::safety::{Safety, SafetyState};
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
@@ -18,7 +20,8 @@ use mikoshi_cooperation::{
 };
 use mikoshi_humanoid::gait::StepTiming;
 use mikoshi_ipc_types::{
-    MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamCommand, TeamState, mode, stop_cause,
+    Drive, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, OperatorInput, RobotState, TeamCommand, TeamState, mode,
+    operator, stop_cause,
 };
 use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -42,9 +45,11 @@ pub struct Coordinator {
     presses: bool,
     /// One robot leads; absent where the team is coordinated by symmetry.
     leading: Option<Leading>,
+    load: Load,
     motion: ObjectMotion,
     timing: StepTiming,
     job: Job,
+    operator: Operator,
     safety: Safety,
     /// When the object is first asked to move, by the job's clock of the motion; it never is when absent.
     motion_start_tick: Option<u64>,
@@ -56,7 +61,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 5;
+pub(crate) const STATE_VERSION: u64 = 7;
 
 /// All that matters between ticks.
 #[repr(C)]
@@ -80,12 +85,19 @@ pub struct CoordinatorState {
     hybrid_since: u64,
     /// The tick since which it controls forces for the hands that it does.
     formed_since: u64,
+    /// Of the references of forces that are in force.
+    references: u64,
     /// Which hands hold the object.
     grips: GripState,
     phase: PhaseWords,
     safety: SafetyState,
-    /// What the operator has said last.
-    operator_word: u64,
+    operator: OperatorState,
+    /// What was heard of the operator before this tick.
+    heard_word: u64,
+    /// The same of whoever drives.
+    heard_drive: Drive,
+    /// What is carried.
+    load: LoadState,
 }
 
 // SAFETY: zeros are a valid value of integers and floats.
@@ -101,6 +113,7 @@ pub struct CoordinatorScratch {
     hands: Vec<HandInput>,
     force_ref: GeneralizedForce,
     position_ref: GeneralizedPosition,
+    load: LoadScratch,
 }
 
 /// Of what is found anew in every tick of the team as it is formed.
@@ -165,12 +178,14 @@ impl Coordinator {
         Ok(Self {
             presses: object_row.is_some_and(|row| row.contains(&Control::Force)),
             odometry: OdometryFrames::new(scenario, &law)?,
+            operator: Operator::new(scenario, &law)?,
             law,
             resting_law: build_resting_law(run)?,
             references,
             compliance: GraspCompliance::new(scenario),
             grips: Grips::new(scenario, hands_of_robots(run)),
             leading: Leading::new(run)?,
+            load: Load::new(scenario, hands_of_robots(run)),
             motion: ObjectMotion::new(run),
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
@@ -201,10 +216,14 @@ impl Coordinator {
             off_at_start: [0.0; 6],
             hybrid_since: 0,
             formed_since: 0,
+            references: self.references.fingerprint(),
             grips: GripState::zeroed(),
             phase: Phase::default().to_words(),
             safety: SafetyState::default(),
-            operator_word: 0,
+            operator: OperatorState::default(),
+            heard_word: 0,
+            heard_drive: Drive::default(),
+            load: LoadState::zeroed(),
         })
     }
 
@@ -227,6 +246,7 @@ impl Coordinator {
             hands: Vec::with_capacity(arms),
             force_ref: GeneralizedForce::zero(arms),
             position_ref: GeneralizedPosition::at_grasp(Pose::identity(), arms),
+            load: LoadScratch::new(arms, self.law.internal_forces().work_len()),
         }
     }
 
@@ -240,7 +260,8 @@ impl Coordinator {
         robots: impl Iterator<Item = &'a RobotState> + Clone,
         out: &mut CoordinatorOutputs,
     ) -> Result<(), CoordinateError> {
-        let CoordinatorScratch { team, law_output, hands, force_ref, position_ref } = scratch;
+        let CoordinatorScratch { team, law_output, hands, force_ref, position_ref, load: load_scratch } =
+            scratch;
         self.law.form(&state.hybrid, &mut team.formation).map_err(|_| CoordinateError::State)?;
         let present = self.grips.present(&state.hybrid);
         let X_WO = state.odometry.frames(self.hands_of_robots.len()).ok_or(CoordinateError::State)?;
@@ -248,18 +269,24 @@ impl Coordinator {
         let wishes = Wishes::of(robots.clone());
 
         let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
-        let mut safety = state.safety;
+        let (mut safety, mut operator) = (state.safety, state.operator);
         let of_team = robots.clone().zip(present);
         let carries = mode::is_hybrid(phase.mode());
-        self.safety.look(&mut safety, tick, of_team, state.clock.is_standing(), state.operator_word);
+        let says = self.operator.listen(&mut operator, &state.heard_of_operator(), tick);
+        self.safety.look(&mut safety, of_team, state.clock.is_standing(), says);
         let is_stopped = safety.is_stopped();
+        if is_stopped {
+            self.operator.rest(&mut operator);
+        }
         let is_free = self.job.is_in_the_air(&phase) && !self.presses;
         let grasp_yield = self.grasp_yield(state, team, hands, is_free)?;
         // Control ends with the first tick of doubt, and starts again after the last.
         let is_blind = safety.is_blind() || state.safety.is_blind();
         let is_hybrid = carries && !is_blind;
         let motion_ticks = self.job.motion_ticks(&phase, tick);
-        let is_moving = motion_ticks.zip(self.motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
+        // Whoever drives does so from the beginning.
+        let motion_start_tick = if self.operator.is_driven() { Some(0) } else { self.motion_start_tick };
+        let is_moving = motion_ticks.zip(motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
         let speed_share = if is_moving && !is_stopped { wishes.speed_share } else { 0.0 };
         // State changes only when nothing can fail any more.
         let mut motion = state.motion;
@@ -269,16 +296,39 @@ impl Coordinator {
             // What the paper compares with, a leader, does not wait for anybody's feet.
             None => {
                 let feet_follow = self.leading.is_some() || state.clock.has_landed();
-                self.motion.advance(&mut motion, speed_share, feet_follow)
+                let X_WA = Pose::from_array(&motion.pose).ok_or(CoordinateError::State)?;
+                match self.operator.wanted(&operator, tick, &X_WA) {
+                    Some(wanted) => self.motion.follow(&mut motion, &(wanted * speed_share), feet_follow),
+                    None => self.motion.advance(&mut motion, speed_share, feet_follow),
+                }
             }
         };
         let X_WA_ref = X_WA_ref.ok_or(CoordinateError::State)?;
         let may_walk = phase.mode() == mode::CARRY;
         let clock = state.clock.advance(&self.timing, &wishes, may_walk).ok_or(CoordinateError::State)?;
 
+        if state.references != self.references.fingerprint() {
+            // They were set to others: those begin with what is there (ADR 0010), too.
+            let since = tick.saturating_sub(state.formed_since);
+            state.off_at_start = self.references.off_after(since, &state.off_at_start).to_array();
+            state.force_at_start = state.hybrid.filtered_force;
+            (state.references, state.formed_since) = (self.references.fingerprint(), tick);
+            operator.squeeze_n = 0.0;
+        }
         let since_start = [state.hybrid_since, state.formed_since].map(|since| tick.saturating_sub(since));
         let start = (&state.force_at_start[..], &state.off_at_start);
         self.references.fill(since_start, &X_WA_ref, start, force_ref, position_ref);
+        self.operator.squeeze(&mut operator, tick, !is_hybrid || phase.is_resting());
+        self.operator.add_squeeze(&operator, force_ref);
+        let mut load = state.load;
+        let holding = Holding {
+            forces: self.law.internal_forces().among(&team.formation),
+            hands,
+            sticks: &state.hybrid.sticks,
+        };
+        let in_force = self.references.share_in_force(since_start[1]);
+        let bearers = robots.clone().zip(&X_WO);
+        self.load.share(&mut load, load_scratch, &X_WA_ref, &holding, bearers, (force_ref, in_force));
         // A leader's team has no hybrid law: hands are where leader and followers have them.
         let is_led = is_hybrid && self.leading.is_some();
         let reference = (is_hybrid && !is_led).then_some(HybridReference {
@@ -299,7 +349,14 @@ impl Coordinator {
         if is_blind && carries {
             carry_hands(state, &mut law_output.hands, &X_WA_ref);
         }
-        (state.motion, state.clock, state.safety) = (motion, clock, safety);
+        let holding = Holding {
+            forces: self.law.internal_forces().among(&team.formation),
+            hands,
+            sticks: &state.hybrid.sticks,
+        };
+        self.load.look(&mut load, &law_output.position.external, &holding, is_free && !is_blind);
+        state.load = load;
+        (state.motion, state.clock, state.safety, state.operator) = (motion, clock, safety, operator);
         state.hand_wrench.iter_mut().zip(&team.hand_wrench).for_each(|(kept, wrench)| *kept = *wrench);
         let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
         move_open_hands(state, &mut law_output.hands, hand_step_m);
@@ -309,6 +366,9 @@ impl Coordinator {
         write_team_state(state, &phase, law_output, reference, out);
         out.team_state.odometry_pose = X_WO.map(|X_WO| X_WO.to_array());
         out.team_state.speed_share = speed_share;
+        state.load.write(&mut out.team_state);
+        out.team_state.drive_silent_ticks = self.operator.silent_ticks(&state.operator, tick);
+        out.team_state.awaited_word = self.job.awaited(&phase);
         if is_hybrid && !is_led && !state.clock.is_standing() {
             self.correct_odometry(state, &team.formation, hands, law_output);
         }
@@ -332,6 +392,9 @@ impl Coordinator {
         let all_hold = seen.all_hold || carries && self.grips.carries_on;
         let next = self.job.next(phase, tick + 1, &Seen { all_hold, ..seen });
         if next != phase {
+            if self.job.awaited(&phase) == state.operator.asked {
+                state.operator.asked = 0;
+            }
             // Whatever a phase moves comes to rest in its end.
             state.motion.twist = [0.0; 6];
             state.phase = next.to_words();
@@ -343,6 +406,9 @@ impl Coordinator {
                 self.start_law(state, tick + 1, hands, &grasp_yield, X_WA, law_output);
             } else if is_hybrid && next.is_resting() != phase.is_resting() {
                 self.start_law(state, tick + 1, hands, &grasp_yield, &X_WA_ref, law_output);
+            }
+            if next.mode() == mode::CARRY {
+                self.operator.begin(&mut state.operator, &state.motion.pose);
             }
         }
         Ok(())
@@ -433,6 +499,7 @@ impl Coordinator {
         let since = now.tick.saturating_sub(state.formed_since);
         state.off_at_start = (self.references.off_after(since, &state.off_at_start) + mean).to_array();
         state.formed_since = now.tick + 1;
+        state.operator.squeeze_n = 0.0;
         Ok(true)
     }
 
@@ -455,6 +522,7 @@ impl Coordinator {
             *slot = VirtualStick::at_grasp(&hand.pose, &X_WB).X_HB.to_array();
         }
         (state.hybrid_since, state.formed_since, state.off_at_start) = (tick, tick, [0.0; 6]);
+        state.operator.squeeze_n = 0.0;
         write_force(&law.force, &mut state.force_at_start);
         let seen = grips::Seen { X_WA, hands, hand_wrench: &state.hand_wrench };
         self.grips.begin(&mut state.grips, &state.hybrid, &seen);
@@ -481,10 +549,14 @@ impl Coordinator {
             in_reach: hands.iter().zip(&self.sticks).all(is_in_reach),
             all_hold: holding.all(|(robot, &present)| grips::all_hold(robot, present)),
             none_holds: robots.clone().all(|robot| robot.holding_hands == 0),
-            motion_is_over: self.motion.is_over(&state.motion),
+            motion_is_over: match self.operator.is_driven() {
+                true => state.operator.asked == operator::LOWER && state.motion.twist == [0.0; 6],
+                false => self.motion.is_over(&state.motion),
+            },
             team_stands: state.clock.is_standing() && wishes.are_content(),
             carried_n: law.force.external.force.z,
             applied_n: law.force.external.force.norm(),
+            asked: state.operator.asked,
         }
     }
 
@@ -546,6 +618,7 @@ impl CoordinatorScratch {
         self.team.hand_wrench.fill([nan; 6]);
         self.team.gaps.fill(None);
         self.hands.clear();
+        self.load.poison();
         self.force_ref.external = Wrench::from_array(&[nan; 6]);
         self.force_ref.internal.fill(Wrench::from_array(&[nan; 6]));
         self.position_ref.internal.fill(Twist::from_array(&[nan; 6]));
@@ -559,9 +632,14 @@ impl CoordinatorScratch {
 }
 
 impl CoordinatorState {
-    /// Hears the operator: this is the last word.
-    pub(crate) fn hear_operator(&mut self, word: u64) {
-        self.operator_word = word;
+    /// What the operator was last heard to say.
+    pub fn heard_of_operator(&self) -> OperatorInput {
+        OperatorInput { word: self.heard_word, drive: self.heard_drive, ..OperatorInput::default() }
+    }
+
+    /// Hears the operator.
+    pub fn hear_operator(&mut self, heard: &OperatorInput) {
+        (self.heard_word, self.heard_drive) = (heard.word, heard.drive);
     }
 }
 
@@ -647,7 +725,11 @@ fn write_team_state(
     team_state.object_twist_ref = state.motion.twist;
     team_state.step_clock = state.clock.clock;
     team_state.team_mode = mode_of(state, phase);
-    team_state.operator_word = state.safety.operator_word;
+    team_state.operator_word = state.operator.word;
+    team_state.drive_number = state.operator.drive.number;
+    team_state.drive_twist = state.operator.drive.twist;
+    team_state.drive_squeeze_n = state.operator.drive.squeeze_n;
+    team_state.squeeze_n = state.operator.squeeze_n;
     team_state.stop_cause = state.safety.cause;
     team_state.stop_robot = state.safety.robot;
     team_state.absent_hands = grips::absent(&state.hybrid);

@@ -72,16 +72,13 @@ impl Fallback {
         let ticks = PARTS + legs.ticks_to_rest();
         // A first knot at the first tick of a loss, the last one when all is at rest.
         let spacing_ticks = ticks.div_ceil(PARTS - 2);
-        let motion = scenario.motion.as_ref();
         Ok(Self {
             ik: WholeBodyIk::new(&robot.model, robot.ik.config().with_longer_ticks(spacing_ticks))?,
             period_s: scenario.control_period_s,
             spacing_ticks,
             braking_ticks: PARTS + scenario.safety.stale_limit_ticks + scenario.coordination_delay_ticks,
             // Without a motion of its own an object goes where a job has it, and stops at once.
-            deceleration: motion.map_or([f64::INFINITY; 2], |motion| {
-                [motion.acceleration_m_s2, motion.angular_acceleration_rad_s2]
-            }),
+            deceleration: scenario.object_braking().unwrap_or([f64::INFINITY; 2]),
         })
     }
 

@@ -4,7 +4,8 @@
 use crate::legs::{LegTargets, Legs, LegsState};
 use mikoshi_humanoid::balance::{PerFoot, Side};
 use mikoshi_humanoid::gait::{ComingToRest, GaitInputs, GaitState, HandCentre, SoleCorrection};
-use nalgebra::Vector2;
+use mikoshi_spatial::Twist;
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// In which a centre of mass comes to rest once both feet stand.
@@ -15,6 +16,7 @@ pub(crate) const REST_S: f64 = 0.8;
 pub(crate) struct Foresight {
     gait: GaitState,
     sole_correction: SoleCorrection,
+    ground_tilt: PerFoot<Vector3<f64>>,
     rest: Option<Rest>,
 }
 
@@ -28,7 +30,12 @@ struct Rest {
 impl Legs {
     /// Legs as they are.
     pub(crate) fn foresee(&self, state: &LegsState) -> Foresight {
-        Foresight { gait: state.gait, sole_correction: state.sole_correction, rest: None }
+        Foresight {
+            gait: state.gait,
+            sole_correction: state.sole_correction,
+            ground_tilt: state.ground_tilt,
+            rest: None,
+        }
     }
 
     /// One tick on, under hands with this centre. While they are led they follow the team's clock; then a foot that
@@ -44,7 +51,9 @@ impl Legs {
                 hand_centre: centre,
                 foot_force: PerFoot::from_fn(|side| self.foot_force_as_planned(&now.feet[side].pose)),
                 soles: None,
+                sole_heights: None,
                 load: ahead.gait.load,
+                divergent_component: None,
             };
             self.gait.act(&mut ahead.gait, &inputs);
         } else {
@@ -66,8 +75,10 @@ impl Legs {
         if let Some(rest) = &ahead.rest {
             reference.com = rest.motion.com(rest.ticks as f64 * self.period_s).push(reference.com.z);
         }
-        let soles =
-            PerFoot::from_fn(|side| reference.feet[side].pose.displaced(&ahead.sole_correction[side]));
+        let soles = PerFoot::from_fn(|side| {
+            let tilt = Twist::new(Vector3::zeros(), ahead.ground_tilt[side]);
+            reference.feet[side].pose.displaced(&(ahead.sole_correction[side] + tilt))
+        });
         self.targets(&reference, &soles, &soles, Vector2::zeros())
     }
 

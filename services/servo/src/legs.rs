@@ -2,9 +2,11 @@
 
 use crate::robot::{BuildRobotError, Robot};
 use mikoshi_config::RunSpec;
+use mikoshi_config::robot::RobotConfig;
 use mikoshi_humanoid::Kinematics;
 use mikoshi_humanoid::balance::{
-    ExternalLoad, Pendulum, PerFoot, Side, Stabiliser, StabiliserConfig, StabiliserInputs, StabiliserState,
+    ExternalLoad, GroundTilt, Pendulum, PerFoot, Side, Stabiliser, StabiliserConfig, StabiliserInputs,
+    StabiliserState,
 };
 use mikoshi_humanoid::estimate::FootContact;
 use mikoshi_humanoid::gait::{
@@ -19,6 +21,9 @@ use serde::{Deserialize, Serialize};
 /// A foot that feels nothing stands on the ground when it is meant to be so low.
 const PLANNED_CONTACT_M: f64 = 0.002;
 
+/// In which a sole comes level again that is in the air.
+const LEVEL_S: f64 = 0.1;
+
 /// Gait and stabiliser of one robot. Immutable.
 #[derive(Clone, Debug)]
 pub(crate) struct Legs {
@@ -26,6 +31,7 @@ pub(crate) struct Legs {
     /// Absent where the scenario turns it off.
     stabiliser: Option<Stabiliser>,
     pub sole_tracking: SoleTracking,
+    ground_tilt: GroundTilt,
     /// The robot as an inverted pendulum.
     pub pendulum: Pendulum,
     pub period_s: f64,
@@ -39,6 +45,8 @@ pub(crate) struct LegsState {
     pub gait: GaitState,
     stabiliser: StabiliserState,
     pub sole_correction: SoleCorrection,
+    /// How the ground is tilted on which each foot stands, as a rotation vector \[rad, world\].
+    pub ground_tilt: PerFoot<Vector3<f64>>,
     /// How much of the base's estimate rests on each foot, 0 to 1.
     trust: PerFoot<f64>,
     /// Base as the last tick's command has it.
@@ -124,11 +132,13 @@ impl Legs {
             ),
             swing: SwingConfig { lift_m: scenario.gait.lift_m, ..SwingConfig::default() },
             preview: PreviewConfig { control_period_s: period_s, com_height_m, ..PreviewConfig::default() },
+            adjusts_steps: scenario.balance.adjusts_steps,
             mirrored: scenario.gait.mirror_opposed && faces_back(run, index),
             ..standard
         };
         let stabiliser =
-            StabiliserConfig::standard(period_s, pendulum, robot.sole_rectangles, config.zmp_in_foot);
+            StabiliserConfig::standard(period_s, pendulum, robot.sole_rectangles, config.zmp_in_foot)
+                .for_leg_drives(strongest_leg_damping(&run.robots[index].config, robot));
         let gait = Gait::new(config)?;
         let on_ground = PerFoot::from_fn(|side| GroundPose::of(&feet[side]));
         let waist: Pose<World, Base> = kinematics.frame_pose(&robot.model, robot.waist);
@@ -136,6 +146,7 @@ impl Legs {
             gait: gait.standing(on_ground, com.xy()),
             stabiliser: StabiliserState::default(),
             sole_correction: PerFoot { right: Twist::zero(), left: Twist::zero() },
+            ground_tilt: PerFoot { right: Vector3::zeros(), left: Vector3::zeros() },
             trust: PerFoot { right: 1.0, left: 1.0 },
             base_commanded: *X_WB,
             hand_centre: None,
@@ -145,6 +156,7 @@ impl Legs {
             gait,
             stabiliser: scenario.balance.stabiliser.then(|| Stabiliser::new(stabiliser)),
             sole_tracking: SoleTracking::default(),
+            ground_tilt: GroundTilt::standard(robot.sole_rectangles, pendulum.weight_n()),
             pendulum,
             period_s,
             waist_over_feet: yawed(-mean_yaw(&on_ground)) * waist.rotation,
@@ -212,14 +224,22 @@ impl Legs {
                     None => self.foot_force_as_planned(&now.feet[side].pose),
                 }),
                 soles: felt.map(|felt| PerFoot::from_fn(|side| GroundPose::of(&felt.soles[side]))),
+                sole_heights: felt.map(|felt| PerFoot::from_fn(|side| felt.soles[side].translation.z)),
                 load,
+                divergent_component: felt
+                    .map(|felt| self.pendulum.divergent_component(&felt.com, &felt.com_velocity)),
             },
         );
         state.steps += u64::from(is_swinging(&state.gait) && !was_swinging);
         self.shift_trust(state);
         self.correct_soles(state, &now, &next, felt);
 
-        let soles = PerFoot::from_fn(|side| next.feet[side].pose.displaced(&state.sole_correction[side]));
+        self.follow_ground(state, &next, felt);
+
+        let soles = PerFoot::from_fn(|side| {
+            let tilt = Twist::new(Vector3::zeros(), state.ground_tilt[side]);
+            next.feet[side].pose.displaced(&(state.sole_correction[side] + tilt))
+        });
         let feet = PerFoot::from_fn(|side| {
             stabilisation.map_or(soles[side], |stabilisation| stabilisation.apply(side, &soles[side]))
         });
@@ -292,6 +312,30 @@ impl Legs {
         }
     }
 
+    /// Soles are tilted as the ground is on which they stand; in the air they come level again.
+    fn follow_ground(&self, state: &mut LegsState, next: &GaitReference, felt: Option<&Felt>) {
+        // Without a stabiliser soles stay where they are planned. What a robot stands on it knows: soles that went on to
+        // learn would hunt each other.
+        if self.stabiliser.is_none() || matches!(state.gait.phase, GaitPhase::Standing { .. }) {
+            return;
+        }
+        let lean = felt.map(|felt| self.ground_tilt.lean(&felt.base, &state.base_commanded));
+        let trust = state.trust.right + state.trust.left;
+        for side in Side::BOTH {
+            let sole_tilt = state.stabiliser.sole_tilt[side];
+            let tilt = &mut state.ground_tilt[side];
+            if !next.feet[side].in_contact {
+                *tilt *= 1.0 - (self.period_s / LEVEL_S).min(1.0);
+            } else if let (Some(felt), Some(lean), true) = (felt, &lean, trust > 0.0) {
+                let share = state.trust[side] / trust;
+                let (sole, wrench) = (&felt.soles[side], &felt.ground_wrench[side]);
+                let rectangle = &self.ground_tilt.soles[side];
+                self.ground_tilt.follow(tilt, lean, rectangle, sole, wrench, (share, self.period_s));
+                self.ground_tilt.learn(tilt, &sole_tilt, sole, self.period_s);
+            }
+        }
+    }
+
     /// What a foot bears that is where this reference has it: the ground comes where the plane is.
     pub(crate) fn foot_force_as_planned(&self, foot: &Pose<World, Foot>) -> f64 {
         if foot.translation.z <= PLANNED_CONTACT_M { self.pendulum.weight_n() } else { 0.0 }
@@ -329,6 +373,15 @@ fn stabiliser_inputs(now: &GaitReference, felt: &Felt) -> StabiliserInputs {
         ground_wrench: felt.ground_wrench,
         load: felt.load,
     }
+}
+
+/// The largest velocity gain of a drive between the root and a sole \[Nms/rad\].
+fn strongest_leg_damping(config: &RobotConfig, robot: &Robot) -> f64 {
+    let model = &robot.model;
+    let legs = Side::BOTH.iter().fold(0, |set, &side| set | model.path(model.frame(robot.soles[side]).body));
+    let joints = model.joints().iter().enumerate().filter(|(index, _)| legs >> index & 1 == 1);
+    let drives = joints.filter_map(|(_, joint)| config.drive_of(&joint.name));
+    drives.map(|drive| drive.kv_nms_rad).fold(0.0, f64::max)
 }
 
 /// As if all were as planned: what the stabiliser has done so far fades.

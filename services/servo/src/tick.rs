@@ -12,6 +12,7 @@ use mikoshi_humanoid::estimate::{
     BaseEstimate, BaseEstimatorState, Readings, SupportPolygon, zero_moment_point,
 };
 use mikoshi_humanoid::gait::{StepClock, StepWish};
+use mikoshi_humanoid::statics::Burden;
 use mikoshi_humanoid::{IkReport, IkScratch, IkState, IkTargets, Kinematics};
 use mikoshi_ipc_types::{
     JointCommand, MAX_HANDS, MAX_JOINTS, PoseWire, RobotState, Sensors, TeamCommand, all_hands, flag, mode,
@@ -24,6 +25,14 @@ use serde::{Deserialize, Serialize};
 const LEAST_GROUND_FORCE: f64 = 0.1;
 /// Share of its limit at which a drive gives all it has, averaged over a tick.
 const FULL_TORQUE: f64 = 0.999;
+/// Ticks after which a robot weighs anew what it bears: loads come and go slowly.
+const BURDEN_TICKS: u64 = 16;
+/// How long a drive is at its limit until the robot would have the object stand.
+const EASE_LOST_S: f64 = 0.5;
+/// How long nothing is at its limit until all of that is forgotten.
+const EASE_GAINED_S: f64 = 15.0;
+/// Slower than this part of its speed no object need go for a drive's sake: it would not spare it anything.
+const LEAST_EASE: f64 = 0.4;
 /// A hand that misses its reference by more is reported as behind.
 const HAND_TOLERANCE_M: f64 = 0.005;
 
@@ -39,7 +48,7 @@ pub struct Servo {
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 7;
+pub(crate) const STATE_VERSION: u64 = 9;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,6 +65,9 @@ pub struct ServoState {
     /// Of the last command: bit h for grasping hand h.
     closed_hands: u64,
     fallback: FallbackState,
+    burden: Burden,
+    /// Part of the object's speed that drives leave, 0 to 1: less where they are at their limits while the robot walks.
+    ease: f64,
 }
 
 /// Workspaces: filled with NaN between ticks they change nothing.
@@ -121,6 +133,8 @@ impl Servo {
             hand_error_max_m: 0.0,
             joint_margin_rad: mikoshi_humanoid::ik::joint_margin(&robot.model, &spec.initial_posture_rad),
             flags: 0,
+            ease: 1.0,
+            burden: robot.burden(&kinematics, 0.0, None),
             closed_hands: if run.scenario.begins_closed() { all_hands(robot.palms.len()) } else { 0 },
         };
         Ok(Self { robot, legs, fallback, period_s: run.scenario.control_period_s, initial })
@@ -191,6 +205,7 @@ impl Servo {
         let torques = self.robot.model.joints().iter().zip(&sensors.joint_torque_nm);
         let is_at_limit =
             torques.into_iter().any(|(joint, torque)| torque.abs() >= FULL_TORQUE * joint.effort);
+        self.take_it_easy(state, is_at_limit);
         self.say_what_is_wished(state, out);
         out.flags |= set(flag::TORQUE_LIMIT, is_at_limit);
     }
@@ -202,16 +217,30 @@ impl Servo {
         self.say_what_is_wished(state, out);
     }
 
+    /// A robot that walks at the limits of its drives wants to go slower, and forgets it by and by.
+    fn take_it_easy(&self, state: &mut ServoState, has_no_torque_left: bool) {
+        let is_strained = has_no_torque_left || state.flags & flag::VELOCITY_LIMIT != 0;
+        let walks = state.legs.gait.clock != StepClock::Standing;
+        state.ease = match is_strained && walks {
+            true => (state.ease - self.period_s / EASE_LOST_S).max(LEAST_EASE),
+            false => (state.ease + self.period_s / EASE_GAINED_S).min(1.0),
+        };
+    }
+
     fn say_what_is_wished(&self, state: &ServoState, out: &mut RobotState) {
         let wish = self.legs.wish(&state.legs);
         let is_behind = state.flags & flag::HANDS_BEHIND != 0;
         out.flags = state.flags | wish_flags(&StepWish { ready: wish.ready && !is_behind, ..wish });
         out.step_urgency = wish.urgency;
-        out.speed_share = self.legs.speed_share(&state.legs);
+        out.land_in_ticks = wish.land_in_ticks;
+        out.speed_share = self.legs.speed_share(&state.legs) * state.ease;
         out.steps = state.legs.steps;
         out.hand_pose_commanded = state.hand_pose_commanded;
         out.joint_margin_min_rad = state.joint_margin_rad;
         out.hand_error_max_m = state.hand_error_max_m;
+        out.bearable_n = state.burden.bearable_n;
+        out.static_torque_share = state.burden.torque_share;
+        out.bearing_moment_nm = state.burden.moment_nm.into();
     }
 
     fn estimate_base(
@@ -266,7 +295,6 @@ impl Servo {
         let com_velocity = kinematics.com_velocity(model, &base.twist, joint_velocity).xy();
         let capture_point = self.legs.pendulum.divergent_component(&com.xy(), &com_velocity);
 
-        let standing = self.legs.standing(legs);
         let contacts = self.legs.contacts(legs);
         let mut ground_wrench = PerFoot { right: Wrench::zero(), left: Wrench::zero() };
         let mut on_robot = Wrench::<World>::zero();
@@ -280,13 +308,19 @@ impl Servo {
         let least_force_n = LEAST_GROUND_FORCE * self.legs.pendulum.weight_n();
         // Without a grip on the ground the margin is that of the capture point alone.
         let zmp = zero_moment_point(&on_robot, 0.0, least_force_n).unwrap_or(capture_point);
+        // A foot that has not found its ground may bear all the same.
+        let planned = self.legs.standing(legs);
+        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(model, robot.soles[side]));
+        let standing = PerFoot::from_fn(|side| {
+            let bears = ground_wrench[side].force.z > least_force_n;
+            planned[side].or(bears.then_some(soles[side]))
+        });
         let support = SupportPolygon::of_feet(&robot.sole_rectangles, &standing);
 
         out.com_position_m = com.into();
         out.zmp_position_m = zmp.into();
         out.zmp_margin_m = support.signed_distance(&zmp);
         out.capture_point_margin_m = support.signed_distance(&capture_point);
-        let soles = PerFoot::from_fn(|side| kinematics.frame_pose(model, robot.soles[side]));
         Felt { com: com.xy(), com_velocity, base: base.pose, soles, ground_wrench, load }
     }
 
@@ -310,6 +344,9 @@ impl Servo {
                 .solve(&self.robot.model, &mut ik, &mut scratch.ik, &targets)
                 .map_err(|_| ServoError::InverseKinematics)?;
             (state.legs, state.ik) = (legs, ik);
+            if command.state_tick.is_multiple_of(BURDEN_TICKS) {
+                self.weigh(state, &scratch.ik.kinematics, targets.stance);
+            }
             self.remember(state, &report);
             self.fallback.begin(&mut state.fallback, (&self.legs, &state.legs), &state.ik, hands);
             self.fallback.go_on(&mut state.fallback, &self.legs, &self.robot, &mut scratch.ik, out);
@@ -319,6 +356,14 @@ impl Servo {
         state.closed_hands = command.map_or(state.closed_hands, |command| command.closed_hands);
         out.closed_hands = state.closed_hands;
         Ok(())
+    }
+
+    /// What the robot bears as it is commanded to stand, by what its hands feel.
+    fn weigh(&self, state: &mut ServoState, kinematics: &Kinematics, stance: Side) {
+        if let Some(felt) = &state.felt {
+            let lifted_n = (felt.load.kappa - 1.0).max(0.0) * self.legs.pendulum.weight_n();
+            state.burden = self.robot.burden(kinematics, lifted_n, Some(stance));
+        }
     }
 
     fn hand_references(&self, command: &TeamCommand) -> Result<[HandReference; MAX_HANDS], ServoError> {

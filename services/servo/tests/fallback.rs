@@ -18,8 +18,12 @@ const SPEED_M_S: f64 = 0.06;
 
 fn run() -> RunSpec {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/transport.toml");
-    // Feet of this robot do not feel what its weight does, which a stabiliser would answer.
-    let overrides = [("motion.acceleration_m_s2", "0.5"), ("balance.stabiliser", "false")];
+    // Feet of this robot do not feel what its weight does, which a stabiliser and steps that adapt would answer.
+    let overrides = [
+        ("motion.acceleration_m_s2", "0.5"),
+        ("balance.stabiliser", "false"),
+        ("balance.adjusts_steps", "false"),
+    ];
     let overrides = overrides.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let scenario = load_scenario(&path, &overrides, None).expect("it loads");
     mikoshi_resolution::resolve(&scenario).expect("it resolves")

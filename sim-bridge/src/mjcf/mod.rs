@@ -12,19 +12,21 @@
 //!
 //! # Names
 //! Bodies, joints, actuators and sites are `ROBOT/LINK`, geoms `ROBOT/LINK#0`, `#1` …; the world's boxes
-//! are `world/BOX`; `floor` and `object` stand alone.
+//! are `world/BOX`, what lies on the floor `floor#0` …; `floor` and `object` stand alone.
 
 mod robot;
 mod text;
 
 pub use robot::{force_and_torque, gyro_and_accelerometer};
 
-use crate::GRAVITY_M_S2;
 use crate::grasp::GraspSite;
 use crate::robot::{Robot, isometry};
 use core::fmt::Write;
 use mikoshi_config::Scenario;
 use mikoshi_config::scenario::{FixedBox, Grasp};
+use mikoshi_physics::{GRAVITY_M_S2, ObjectBody};
+use mikoshi_physics::{Slab, slabs};
+use nalgebra::{Matrix3, Vector3};
 use text::{escape, numbers, pose};
 
 /// The floor's and the object's names.
@@ -63,16 +65,17 @@ pub fn qualified(robot: &str, element: &str) -> String {
 ///
 /// Contacts: an elliptic cone with impratio 100. With the pyramidal cone soles creep under a constant
 /// tangential load, since its friction is regularised.
-pub fn world(scenario: &Scenario, robots: &[Robot], grasps: &[GraspSite]) -> String {
+pub fn world(scenario: &Scenario, object: &ObjectBody, robots: &[Robot], grasps: &[GraspSite]) -> String {
     let mut xml = String::new();
     // Writing to a String cannot fail.
-    write_world(&mut xml, scenario, robots, grasps).unwrap_or_default();
+    write_world(&mut xml, scenario, object, robots, grasps).unwrap_or_default();
     xml
 }
 
 fn write_world(
     xml: &mut String,
     scenario: &Scenario,
+    object: &ObjectBody,
     robots: &[Robot],
     grasps: &[GraspSite],
 ) -> core::fmt::Result {
@@ -102,7 +105,10 @@ fn write_world(
     for fixed in &scenario.world.boxes {
         write_fixed_box(xml, fixed)?;
     }
-    write_object(xml, scenario, grasps)?;
+    for (index, slab) in slabs(scenario).iter().enumerate() {
+        write_slab(xml, index, slab)?;
+    }
+    write_object(xml, scenario, object, grasps)?;
     for robot in robots {
         robot::write_bodies(xml, robot)?;
     }
@@ -150,27 +156,68 @@ fn write_fixed_box(xml: &mut String, fixed: &FixedBox) -> core::fmt::Result {
     )
 }
 
+fn write_slab(xml: &mut String, index: usize, slab: &Slab) -> core::fmt::Result {
+    let surface = slab.surface.map_or_else(String::new, |[friction, contact_s]| {
+        format!(
+            r#" priority="1" friction="{friction} 0.005 0.0001" solref="{contact_s} 1" rgba="0.6 0.7 0.8 1""#
+        )
+    });
+    let attitude = slab.attitude.quaternion();
+    writeln!(
+        xml,
+        r#"    <geom name="{}{index}" type="box" pos="{}" quat="{}" size="{}"{surface}/>"#,
+        ground_prefix(),
+        numbers(slab.centre_m.as_slice()),
+        numbers(&[attitude.w, attitude.i, attitude.j, attitude.k]),
+        numbers((slab.size_m * 0.5).as_slice()),
+    )
+}
+
+/// What names of the ground's slabs begin with. No geom of a robot is called so: theirs have a slash before their index.
+pub fn ground_prefix() -> String {
+    format!("{FLOOR}#")
+}
+
 /// `qw qx qy qz` of a heading.
 fn about_z(yaw_deg: f64) -> [f64; 4] {
     let half_yaw = 0.5 * yaw_deg.to_radians();
     [half_yaw.cos(), 0.0, 0.0, half_yaw.sin()]
 }
 
-fn write_object(xml: &mut String, scenario: &Scenario, grasps: &[GraspSite]) -> core::fmt::Result {
+/// The simulator has fewer numbers for a body whose centre of mass is its origin, and a model can only be changed for one
+/// that has as many: a millionth of a metre tells bodies that change from those that don't.
+fn com_of(scenario: &Scenario, body: &ObjectBody) -> [f64; 3] {
+    let aside = if scenario.world.load_changes.is_empty() { 0.0 } else { 1e-6 };
+    (body.com_m + Vector3::new(0.0, 0.0, aside)).into()
+}
+
+fn inertia_of(inertia: &Matrix3<f64>) -> String {
+    let diagonal = [inertia.m11, inertia.m22, inertia.m33];
+    match [inertia.m12, inertia.m13, inertia.m23] {
+        [0.0, 0.0, 0.0] => format!(r#"diaginertia="{}""#, numbers(&diagonal)),
+        products => format!(r#"fullinertia="{} {}""#, numbers(&diagonal), numbers(&products)),
+    }
+}
+
+fn write_object(
+    xml: &mut String,
+    scenario: &Scenario,
+    body: &ObjectBody,
+    grasps: &[GraspSite],
+) -> core::fmt::Result {
     let object = &scenario.object;
     let [x, y, z] = object.size_m;
-    // A homogeneous box.
-    let inertia = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| object.mass_kg * sum / 12.0);
     writeln!(
         xml,
         r#"    <body name="{OBJECT}" pos="{}" quat="{}">
       <freejoint/>
-      <inertial pos="0 0 0" mass="{}" diaginertia="{}"/>
+      <inertial pos="{}" mass="{}" {}/>
       <geom name="{OBJECT}" type="box" size="{}"/>"#,
         numbers(&object.position_m),
         numbers(&about_z(object.yaw_deg)),
-        object.mass_kg,
-        numbers(&inertia),
+        numbers(&com_of(scenario, body)),
+        body.mass_kg,
+        inertia_of(&body.inertia_kg_m2),
         numbers(&[0.5 * x, 0.5 * y, 0.5 * z]),
     )?;
     for grasp in grasps {

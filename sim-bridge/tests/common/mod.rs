@@ -6,6 +6,7 @@ use bytemuck::Zeroable;
 use mikoshi_config::{RobotSpec, RunSpec, load_scenario};
 use mikoshi_humanoid::{Kinematics, Model};
 use mikoshi_ipc_types::{JointCommand, ObjectTruth, PoseWire, RobotTruth, Sensors, WrenchWire};
+use mikoshi_physics::Physics as _;
 use mikoshi_sim_bridge::World as SimulatedWorld;
 use mikoshi_spatial::{Base, Foot, Hand, Object, Pose, World};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};

@@ -5,6 +5,8 @@ use mikoshi_tests::programs::mikoshi;
 use mikoshi_tests::run::{Results, Running, Said, run, say, say_mikoshi};
 use mikoshi_tests::scenarios::of_project;
 use rustix::process::{Pid, Signal, kill_process};
+use std::io::Write;
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::yield_now;
@@ -66,10 +68,16 @@ fn a_recorder_that_comes_late_has_all_from_then_to_the_end() {
 }
 
 #[test]
-fn recorders_that_are_frozen_and_killed_change_nothing() {
+fn listeners_that_are_frozen_and_killed_or_take_nothing_change_nothing() {
     let results = Results::new();
     let running = start(&results);
     let recorders = ["one", "two"].map(|name| record(&running, &results.path().join(name)));
+    // Two that ask for ticks, all of them or some as a viewer does, and never take one.
+    let _takes_nothing = [b"A", b"S"].map(|wish| {
+        let mut feed = UnixStream::connect(running.directory().join("feed")).expect("somebody speaks there");
+        feed.write_all(wish).expect("it is heard");
+        feed
+    });
     let signal = |child: &Child, signal| {
         let pid = Pid::from_raw(child.id() as i32).expect("a pid");
         kill_process(pid, signal).expect("it is ours");

@@ -16,6 +16,17 @@ fn teams_of_two_to_eight_robots_carry_for_twenty_seconds() {
     }
 }
 
+/// HRP-2 and a robot that is taller, has arms of seven joints and narrower feet.
+#[test]
+fn robots_of_two_kinds_carry_together() {
+    let results = Results::new();
+    let said = run(&of_project("mixed"), &["--in-process", "--no-log"], &results);
+    let summary = results.summary();
+    assert_eq!(said.status, Some(0), "{:#}", summary["failures"]);
+    let joints = |robot: usize| summary["robots"][robot]["torque_peak_nm"].as_object().expect("joints").len();
+    assert_eq!([joints(0), joints(1)], [32, 28]);
+}
+
 /// Odometries part with every step, and by the way between them the object's turn would move hands against each
 /// other.
 #[test]

@@ -5,6 +5,7 @@
 //! the inverse kinematics does it. It does no I/O and allocates nothing.
 
 mod distribution;
+mod ground_tilt;
 mod nearest;
 mod pendulum;
 mod pull;
@@ -12,6 +13,7 @@ mod side;
 mod stabiliser;
 
 pub use distribution::{FootLoad, distribute};
+pub use ground_tilt::GroundTilt;
 pub use nearest::nearest_in_polygon;
 pub use pendulum::{ExternalLoad, GRAVITY_M_S2, Pendulum};
 pub use pull::PulledRobot;

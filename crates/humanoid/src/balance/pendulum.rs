@@ -108,6 +108,11 @@ impl ExternalLoad {
         self.about + (zmp - self.about) * self.kappa + self.shift
     }
 
+    /// How far e moves of a zero moment point that stays, while the hands go by `way` \[m, world\].
+    pub fn drift(&self, way: &Vector2<f64>) -> Vector2<f64> {
+        way * (1.0 - self.kappa)
+    }
+
     /// z of an extended zero moment point e \[m, world\].
     pub fn ground_zmp(&self, extended_zmp: &Vector2<f64>) -> Vector2<f64> {
         self.about + (extended_zmp - self.about - self.shift) / self.kappa

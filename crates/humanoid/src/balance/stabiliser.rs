@@ -38,6 +38,17 @@ pub struct StabiliserConfig {
     pub ankle_rad_s_nm: f64,
     /// Largest tilt of a sole \[rad\].
     pub ankle_max_rad: f64,
+    /// Way of a foot's centre of pressure past where it is wanted, beyond which the foot stands on the edge of something and is
+    /// turned faster and faster \[m\].
+    pub edge_m: f64,
+    /// Error of the divergent component from which on a foot is at its edge because its robot falls \[m\].
+    pub edge_dcm_m: f64,
+    /// For how long: the way that is past, by time \[m s\]. What alternates is no edge.
+    pub edge_patience_m_s: f64,
+    /// By how much faster \[rad/s² by Nm\].
+    pub edge_rad_s2_nm: f64,
+    /// At most \[rad/s\].
+    pub edge_max_rad_s: f64,
     /// Admittance of the force difference between the feet.
     pub force_difference_m_s_n: f64,
     /// Largest difference of the feet's heights \[m\].
@@ -69,13 +80,41 @@ impl StabiliserConfig {
             sole_margin_m: 0.01,
             ankle_rad_s_nm: 1e-3,
             ankle_max_rad: 0.15,
+            edge_m: 0.022,
+            edge_dcm_m: 0.02,
+            edge_patience_m_s: 0.0008,
+            edge_rad_s2_nm: 0.15,
+            edge_max_rad_s: 0.4,
             force_difference_m_s_n: 3e-5,
             height_difference_max_m: 0.03,
             com_admittance_1_s2: 0.0,
             com_offset_max_m: 0.03,
         }
     }
+
+    /// The same for legs of which the most strongly damped drive has `damping_nms_rad`: admittances shrink where that is
+    /// more than HRP-2's 500.
+    ///
+    /// Drives take velocity references, too. A displacement δ that a tick of T brings is a velocity δ/T for its time, and
+    /// with damping B a moment B δ/T. An admittance A answers it by −A T times that, so that the loop's gain is A B whatever
+    /// the period. At 2 it turns over and alternates from tick to tick; with HRP-2's drives it is at .5, where what bends
+    /// elsewhere has been seen to do no harm.
+    pub fn for_leg_drives(mut self, damping_nms_rad: f64) -> Self {
+        let share = (STANDARD_DAMPING_NMS_RAD / damping_nms_rad).min(1.0);
+        self.ankle_rad_s_nm *= share;
+        self.force_difference_m_s_n *= share;
+        self.edge_rad_s2_nm *= share;
+        self
+    }
 }
+
+/// How many times lighter than the whole robot a foot may be that feels an edge as if it bore all.
+const LIGHTEST: f64 = 4.0;
+/// Share of the weight below which a foot does not say where it bears.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Of the drives for which [`StabiliserConfig::standard`] is.
+const STANDARD_DAMPING_NMS_RAD: f64 = 500.0;
 
 /// All that matters from tick to tick: floats only, without padding.
 #[repr(C)]
@@ -85,6 +124,8 @@ pub struct StabiliserState {
     pub dcm_error_integral: Vector2<f64>,
     /// Tilt of each sole about its own x and y axes \[rad\].
     pub sole_tilt: PerFoot<Vector2<f64>>,
+    /// Of a sole that stands on an edge: its moment past what is usual, since it is \[Nm s\].
+    pub sole_turning: PerFoot<Vector2<f64>>,
     /// Height of the left sole over the right one \[m\].
     pub height_difference: f64,
     /// Offset of the centre of mass \[m, world\].
@@ -174,6 +215,7 @@ impl Stabiliser {
     /// 3. To the feet ([`distribute`]).
     /// 4. Ankle admittance, in the foot's axes: `d(tilt)/dt = A (τ − τ_desired) − tilt / leak`: a sole
     ///    yields to the ground's moment and so brings it to what is desired.
+    ///    One that stands on the edge of something does not feel its turning: it turns faster and faster until it does.
     /// 5. Force difference: `d(h)/dt = A ((f_L − f_R) − desired) − h / leak`, h the left sole's height
     ///    over the right one's, half of it to each: the foot that bears too much is drawn up.
     /// 6. Admittance of the centre of mass to the error of the zero moment point (off by default).
@@ -204,11 +246,39 @@ impl Stabiliser {
 
         for side in Side::BOTH {
             let tilt = &mut state.sole_tilt[side];
+            let turning = &mut state.sole_turning[side];
             let mut rate = -*tilt / config.leak_s;
+            if inputs.standing[side].is_none() {
+                *turning = Vector2::zeros();
+            }
             if let Some(foot) = &inputs.standing[side] {
                 let excess =
                     inputs.ground_wrench[side].moment.xy() - loads[side].moment_about(&foot.translation.xy());
-                rate += (foot.rotation.inverse() * excess.push(0.0)).xy() * config.ankle_rad_s_nm;
+                let in_foot = |moment: Vector2<f64>| (foot.rotation.inverse() * moment.push(0.0)).xy();
+                let excess = in_foot(excess);
+                // By where a foot bears and not by how much: one that has just landed feels an edge as well.
+                let bears = inputs.ground_wrench[side].force.z;
+                let wanted = FootLoad { force: bears, ..loads[side] };
+                let is_balanced = dcm_error.norm() < config.edge_dcm_m;
+                let feels = is_balanced && bears > LEAST_SHARE * pendulum.weight_n();
+                let off = if feels {
+                    in_foot(
+                        inputs.ground_wrench[side].moment.xy() - wanted.moment_about(&foot.translation.xy()),
+                    ) * (pendulum.weight_n() / bears.max(1.0)).clamp(1.0, LIGHTEST)
+                } else {
+                    Vector2::zeros()
+                };
+                let usual = config.edge_m * pendulum.weight_n();
+                let patience = config.edge_patience_m_s * pendulum.weight_n();
+                let most = patience + config.edge_max_rad_s / config.edge_rad_s2_nm.max(1e-9);
+                *turning = turning.zip_map(&off, |turning, off| {
+                    let beyond = off - off.clamp(-usual, usual);
+                    // At once at rest where the sole has found the ground.
+                    let kept = if beyond * turning > 0.0 { turning } else { 0.0 };
+                    (kept + beyond * dt).clamp(-most, most)
+                });
+                let turned = turning.map(|turning| turning - turning.clamp(-patience, patience));
+                rate += excess * config.ankle_rad_s_nm + turned * config.edge_rad_s2_nm;
             }
             *tilt = (*tilt + rate * dt).map(|value| value.clamp(-config.ankle_max_rad, config.ankle_max_rad));
         }
@@ -260,4 +330,4 @@ impl Stabiliser {
     }
 }
 
-const _: () = assert!(size_of::<StabiliserState>() == 11 * size_of::<f64>());
+const _: () = assert!(size_of::<StabiliserState>() == 15 * size_of::<f64>());

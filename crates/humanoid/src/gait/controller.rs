@@ -5,13 +5,14 @@ use super::foot_placement::{FootError, FootPlacement, HandCentre};
 use super::ground_pose::{GroundPose, wrap};
 use super::machine::{GaitPhase, SwingingFoot, TransitionInputs};
 use super::preview::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError};
+use super::step_adjustment::{StepAdjustment, StepInHand};
 use super::step_clock::{StepClock, StepTiming};
 use super::step_planner::StepLimits;
 use super::swing::{Foothold, SwingConfig, SwingContact};
 use super::team_clock::StepWish;
 use super::zmp_reference::ZmpReference;
-use crate::balance::{ExternalLoad, PerFoot, Side};
-use crate::estimate::SoleRectangle;
+use crate::balance::{ExternalLoad, GRAVITY_M_S2, PerFoot, Side};
+use crate::estimate::{SoleRectangle, SupportPolygon};
 use mikoshi_spatial::{Foot, Pose, Twist, World};
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -46,6 +47,8 @@ pub struct GaitConfig {
     pub reference_lead_s: f64,
     /// Time constant of the low-pass through which the hands' load moves the centre of mass.
     pub load_filter_s: f64,
+    /// Whether steps change while they are made, for a robot that was pushed.
+    pub adjusts_steps: bool,
 }
 
 impl GaitConfig {
@@ -68,6 +71,7 @@ impl GaitConfig {
             mirrored: false,
             reference_lead_s: 0.4,
             load_filter_s: 1.0,
+            adjusts_steps: true,
         }
     }
 }
@@ -91,6 +95,19 @@ pub struct GaitState {
     pub clock: StepClock,
     /// Reference of the zero moment point on the ground \[m, world\].
     pub zmp_ref: Vector2<f64>,
+    /// What only a step can do about it.
+    pub trouble: Trouble,
+}
+
+/// How a robot is off balance beyond what its soles can do about it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Trouble {
+    /// What of its divergent component's error is left to steps \[m, world\]; zero where all is well.
+    pub excess: Vector2<f64>,
+    /// Whether its divergent component is past the edge of what it stands on.
+    pub falls: bool,
+    /// Whether the foot that is to swing next bears too much for the other one to be trusted: ground that gave way, or an edge.
+    pub bears: bool,
 }
 
 /// What one tick takes.
@@ -104,8 +121,12 @@ pub struct GaitInputs {
     pub foot_force: PerFoot<f64>,
     /// Where each sole is by encoders, from the base that the standing foot bears; as planned when absent.
     pub soles: Option<PerFoot<GroundPose>>,
+    /// Heights of soles by the same; as planned when absent \[m\].
+    pub sole_heights: Option<PerFoot<f64>>,
     /// The measured hands' load.
     pub load: ExternalLoad,
+    /// The divergent component as measured \[m, world\]; as planned when absent.
+    pub divergent_component: Option<Vector2<f64>>,
 }
 
 /// Reference of one foot at the end of the tick.
@@ -141,12 +162,15 @@ pub struct GaitReference {
 pub struct Gait {
     config: GaitConfig,
     preview: PreviewControl,
+    adjustment: StepAdjustment,
 }
 
 impl Gait {
     /// Solves for the preview gains.
     pub fn new(config: GaitConfig) -> Result<Self, SolvePreviewError> {
-        Ok(Self { preview: PreviewControl::new(&config.preview)?, config })
+        let preview = PreviewControl::new(&config.preview)?;
+        let adjustment = StepAdjustment::standard((GRAVITY_M_S2 / config.preview.com_height_m).sqrt());
+        Ok(Self { preview, adjustment, config })
     }
 
     /// Its parameters.
@@ -166,6 +190,7 @@ impl Gait {
             load: ExternalLoad::NONE,
             clock: StepClock::Standing,
             zmp_ref: com,
+            trouble: Trouble::default(),
         }
     }
 
@@ -173,10 +198,14 @@ impl Gait {
     ///
     /// All is judged by eq. 40 for both feet, against references as they will be at the NEXT landing.
     pub fn wish(&self, state: &GaitState, hand_centre: Option<&HandCentre>) -> StepWish {
-        let ready = state.phase.is_ready(&state.clock);
-        let (Some(placement), Some(centre)) = (&state.placement, hand_centre) else {
-            return StepWish { ready, ..StepWish::CONTENT };
-        };
+        // Who is off balance on both feet stays there until he is not, if he is not falling.
+        let is_in_trouble = state.trouble.excess != Vector2::zeros();
+        let waits = is_in_trouble && !state.trouble.falls && state.clock != StepClock::Standing;
+        let ready = state.phase.is_ready(&state.clock)
+            && !(state.phase.planned_step().is_some() && (waits || state.trouble.bears));
+        let land_in_ticks = state.phase.swinging_foot().map_or(0, |foot| foot.swing.change.land_in_ticks);
+        let content = StepWish { ready, land_in_ticks, ..StepWish::CONTENT };
+        let (Some(placement), Some(centre)) = (&state.placement, hand_centre) else { return content };
         let timing = &self.config.timing;
         // Feet and swing foot as they are when the next undecided step starts, and ticks to its landing.
         let feet = footholds(state);
@@ -191,7 +220,7 @@ impl Gait {
                 let reference = placement.reference_feet(&centre.after(self.seconds(ticks)));
                 (feet, self.config.limits.first_swing(&feet, &reference), ticks)
             }
-            _ => return StepWish { ready, ..StepWish::CONTENT },
+            _ => return content,
         };
         let at_landing = placement.reference_feet(&centre.after(self.seconds(ticks)));
         let urgency = relative_error(&at_landing, &feet, &self.config.start);
@@ -201,18 +230,21 @@ impl Gait {
         // By the time of another first landing: who would want to walk again at once must not stop.
         let later = ticks + timing.finish() + timing.step(0);
         let at_restart = placement.reference_feet(&centre.after(self.seconds(later)));
+        let stands = state.clock == StepClock::Standing;
+        let falls = stands && state.trouble.falls && is_in_trouble;
         StepWish {
-            wants_step: state.clock == StepClock::Standing && urgency > 1.0,
+            wants_step: stands && (urgency > 1.0 || falls),
             can_stop: relative_error(&at_landing, &stepped, &self.config.stop) < 1.0
                 && relative_error(&at_restart, &stepped, &self.config.start) < 1.0,
             ready,
-            first_swing: swing.mirrored(self.config.mirrored),
-            urgency,
+            first_swing: if falls { self.catching_foot(state) } else { swing }.mirrored(self.config.mirrored),
+            urgency: if falls { urgency.max(FALLING_URGENCY) } else { urgency },
+            land_in_ticks: if falls { 1 } else { land_in_ticks },
         }
     }
 
     /// The share of its speed that the object may keep without leaving the robot behind (Fig. 10b): 1 up
-    /// to the error `slow`, 0 from `halt` on.
+    /// to the error `slow`, 0 from `halt` on, beside what a walk at that speed brings.
     pub fn speed_share(&self, state: &GaitState, hand_centre: Option<&HandCentre>) -> f64 {
         let (Some(placement), Some(centre)) = (&state.placement, hand_centre) else { return 1.0 };
         let (feet, reference) = (footholds(state), placement.reference_feet(&centre.pose));
@@ -221,15 +253,21 @@ impl Gait {
             yaw: wrap(feet.right.yaw + wrap(feet.left.yaw - feet.right.yaw) / 2.0),
         };
         let error = FootError::between(&middle(&reference), &middle(&feet));
-        let GaitConfig { slow, halt, .. } = &self.config;
-        let share = |error: f64, slow: f64, halt: f64| ((halt - error) / (halt - slow)).clamp(0.0, 1.0);
-        share(error.position, slow.position, halt.position).min(share(error.yaw, slow.yaw, halt.yaw))
+        let GaitConfig { slow, halt, timing, .. } = &self.config;
+        // Feet go in steps, and who walks as fast as the hands is half a step ahead of them or behind, in turn.
+        let half_step_s = 0.5 * self.seconds(timing.step(1));
+        let share = |error: f64, speed: f64, slow: f64, halt: f64| {
+            ((halt + speed * half_step_s - error) / (halt - slow)).clamp(0.0, 1.0)
+        };
+        let position = share(error.position, centre.velocity.norm(), slow.position, halt.position);
+        position.min(share(error.yaw, centre.yaw_rate.abs(), slow.yaw, halt.yaw))
     }
 
     /// One tick: the phase follows the clock, the step that is planned follows the hands, the centre of
     /// mass follows the zero moment point's reference. Returns the references at the end of the tick.
     pub fn act(&self, state: &mut GaitState, inputs: &GaitInputs) -> GaitReference {
         let timing = &self.config.timing;
+        self.follow_hurry(state, &inputs.clock);
         state.clock = inputs.clock;
         state.phase = state.phase.next(&TransitionInputs {
             clock: inputs.clock,
@@ -241,7 +279,13 @@ impl Gait {
         });
         let share = self.swing_share(&inputs.clock);
         let (duration, dt) = (self.seconds(timing.single_support), self.config.preview.control_period_s);
+        if self.config.adjusts_steps {
+            self.adjust_step(state, inputs, share, duration);
+        }
         let landed = state.phase.meet_ground(&self.config.swing, &inputs.foot_force, share, duration, dt);
+        if let Some(foot) = state.phase.swinging_foot_mut() {
+            foot.swing.advance(&self.config.swing, (1.0 - share) * duration, dt);
+        }
         if let Some((side, foothold)) = landed {
             let foothold = foothold.on_plane_within(self.config.swing.plane_tolerance_m);
             // A leg sags, and its foot lands some tenths of a millimetre from where it was sent, step for step
@@ -256,7 +300,11 @@ impl Gait {
         state.load = state.load.filtered_towards(&inputs.load, blend);
         let reference = self.zmp_reference(state, inputs);
         let load = state.load;
-        self.preview.advance(&mut state.preview, &reference.mapped(|zmp| load.extended_zmp(zmp)));
+        // Hands move on, and their load with them.
+        let velocity = inputs.hand_centre.map_or_else(Vector2::zeros, |centre| centre.velocity);
+        let (drift, horizon) = (load.drift(&(velocity * dt)), (self.config.preview.horizon_s / dt) as i64);
+        let extended = reference.mapped(|zmp| load.extended_zmp(zmp)).with_drift(&drift, horizon);
+        self.preview.advance(&mut state.preview, &extended);
         state.zmp_ref = reference.at(1);
         self.reference(state)
     }
@@ -313,6 +361,118 @@ impl Gait {
             }
             _ => (ticks + 1.0) / ticks,
         }
+    }
+
+    /// A foot in the air whose clock leaves out ticks goes on from where it is, in the time that is left.
+    fn follow_hurry(&self, state: &mut GaitState, clock: &StepClock) {
+        let (
+            StepClock::Stepping { step_index: before, tick_in_step: from, .. },
+            StepClock::Stepping { step_index: now, tick_in_step: to, .. },
+        ) = (state.clock, *clock)
+        else {
+            return;
+        };
+        let duration = self.seconds(self.config.timing.single_support);
+        let share_before = self.swing_share(&state.clock);
+        let seconds_left = (1.0 - self.swing_share(clock)) * duration;
+        if let (true, Some(foot)) = (now == before && to > from + 1, state.phase.swinging_foot_mut()) {
+            foot.swing.bend(&self.config.swing, share_before, duration);
+            if let Some(bent) = &mut foot.swing.bent {
+                bent.hurry(seconds_left);
+            }
+        }
+    }
+
+    /// Where the robot is off balance beyond what its soles can do about it, the swinging foot goes where that leads, and
+    /// the plan with it.
+    fn adjust_step(&self, state: &mut GaitState, inputs: &GaitInputs, share: f64, duration: f64) {
+        let dt = self.config.preview.control_period_s;
+        let omega = self.adjustment.frequency_1_s;
+        let planned_dcm = state.preview.com + state.preview.com_velocity / omega;
+        let measured_dcm = inputs.divergent_component.unwrap_or(planned_dcm);
+        let swinging = state.phase.swinging_foot();
+        let stance = swinging.map_or(state.stance, |foot| foot.side.opposite());
+        let pose = state.feet[stance].pose;
+        let GaitConfig { limits, zmp_in_foot, .. } = &self.config;
+        let excess =
+            self.adjustment.excess(&(measured_dcm - planned_dcm), &limits.soles, zmp_in_foot, stance, &pose);
+        let falls = || {
+            let standing = PerFoot::from_fn(|side| {
+                let is_up = swinging.is_some_and(|foot| foot.side == side);
+                (!is_up).then(|| state.feet[side].in_world())
+            });
+            let support = SupportPolygon::of_feet(&limits.soles, &standing);
+            support.signed_distance(&state.load.ground_zmp(&measured_dcm)) < 0.0
+        };
+        let force = &inputs.foot_force;
+        let bears = |foot: Side| force[foot] > MOST_BEFORE_SWING * (force.right + force.left);
+        state.trouble = Trouble {
+            excess,
+            falls: excess != Vector2::zeros() && falls(),
+            bears: inputs.divergent_component.is_some()
+                && state.phase.planned_step().is_some_and(|step| bears(step.side)),
+        };
+
+        if inputs.divergent_component.is_some() {
+            self.lower_stance(state, inputs, dt);
+        }
+        let pivot = state.load.extended_zmp(&self.zmp_under(stance, &pose));
+        let GaitPhase::SingleSupport { foot: SwingingFoot { side, swing }, .. } = &mut state.phase else {
+            return;
+        };
+        swing.change.land_in_ticks = 0;
+        if !matches!(swing.contact, SwingContact::Swinging { .. }) {
+            return;
+        }
+        let step = StepInHand {
+            swing: *side,
+            stance: pose,
+            pivot,
+            planned: GroundPose { position: swing.to.pose.position - swing.change.moved, ..swing.to.pose },
+            offset: swing.change.offset,
+            seconds_left: (1.0 - share) * duration + dt,
+            planned_dcm,
+        };
+        let Some(adjusted) = self.adjustment.adjust(&step, &excess, limits, dt) else { return };
+        swing.bend(&self.config.swing, share - dt / duration, duration);
+        swing.to.pose = adjusted.to;
+        swing.change.moved = adjusted.to.position - step.planned.position;
+        swing.change.offset = Some(adjusted.offset);
+        if adjusted.land_in_s < step.seconds_left - HURRY_WORTH_S {
+            swing.change.land_in_ticks = (adjusted.land_in_s / dt).round().max(1.0) as u64;
+        }
+        state.preview.com_velocity += adjusted.take_over * omega;
+    }
+
+    /// Weight that is to go to a foot and does not come finds the ground lower than it was felt to be: at the edge of
+    /// something, under a sole that turns, or soft.
+    fn lower_stance(&self, state: &mut GaitState, inputs: &GaitInputs, dt: f64) {
+        let GaitPhase::DoubleSupport { step, landing: None, .. } = state.phase else { return };
+        let stance = step.side.opposite();
+        let [from, to] = [step.side, stance].map(|side| self.zmp_under(side, &state.feet[side].pose));
+        let way = to - from;
+        let wanted = ((state.zmp_ref - from).dot(&way) / way.norm_squared().max(1e-9)).clamp(0.0, 1.0);
+        let force = &inputs.foot_force;
+        let comes = force[stance] / (force.right + force.left).max(1.0);
+        let swing = &self.config.swing;
+        let height = &mut state.feet[stance].height;
+        if let Some(heights) = &inputs.sole_heights {
+            // What a foot does that comes to bear, the other one sees.
+            let off = heights[stance] - *height;
+            *height += (off - off.clamp(-SETTLED_M, SETTLED_M)) * (dt / SETTLE_S).min(1.0);
+        }
+        if wanted - comes > MISSING_SHARE && *height > -swing.lowering_max_m {
+            *height -= swing.reaching_m_s * dt;
+        }
+    }
+
+    /// The foot that had better swing first where a robot that stands is about to fall: the one on whose side it falls, if
+    /// it falls aside; else the one that bears less.
+    fn catching_foot(&self, state: &GaitState) -> Side {
+        let middle = (state.feet.right.pose.position + state.feet.left.pose.position) / 2.0;
+        let to_left = state.feet.left.pose.position - middle;
+        let off = state.preview.com + state.trouble.excess - middle;
+        if off.dot(&to_left) > 0.0 { Side::Right } else { Side::Left }
     }
 
     /// The step that is planned but not begun follows the moving references.
@@ -406,6 +566,18 @@ impl Gait {
         }
     }
 }
+
+/// What a robot that falls says of how urgent its step is.
+const FALLING_URGENCY: f64 = 100.0;
+/// Share of the robot's weight on a foot that may leave the ground.
+const MOST_BEFORE_SWING: f64 = 0.4;
+/// By how much a sole's height is not worth a correction once it has landed \[m\], and the correction's time constant \[s\].
+const SETTLED_M: f64 = 0.002;
+const SETTLE_S: f64 = 0.05;
+/// Share of the weight that has not come to a foot whose ground is lower than it was felt to be.
+const MISSING_SHARE: f64 = 0.35;
+/// A landing that is sooner by less is not worth the others' hurry \[s\].
+const HURRY_WORTH_S: f64 = 0.02;
 
 /// The worst error (eq. 40) of both feet as a multiple of `threshold`.
 fn relative_error(reference: &PerFoot<GroundPose>, feet: &PerFoot<GroundPose>, threshold: &FootError) -> f64 {

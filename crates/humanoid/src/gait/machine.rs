@@ -106,7 +106,7 @@ impl GaitPhase {
         let TransitionInputs { clock, timing, feet, zmp_ref, middle, mirrored } = *inputs;
         match (self, clock) {
             (Self::Standing { .. }, StepClock::Stepping { step_index: 0, tick_in_step, swing, .. })
-                if tick_in_step < timing.lead =>
+                if tick_in_step < timing.lead || tick_in_step == timing.hurried_start() =>
             {
                 let side = swing.mirrored(mirrored);
                 let step = PlannedStep { index: 0, side, to: feet[side].pose };
@@ -167,6 +167,15 @@ impl GaitPhase {
         match *self {
             Self::SingleSupport { foot, .. } => Some(foot),
             Self::DoubleSupport { landing, .. } | Self::Finishing { landing, .. } => landing,
+            Self::Standing { .. } | Self::ShiftingWeight { .. } => None,
+        }
+    }
+
+    /// The same, for its way to be changed.
+    pub fn swinging_foot_mut(&mut self) -> Option<&mut SwingingFoot> {
+        match self {
+            Self::SingleSupport { foot, .. } => Some(foot),
+            Self::DoubleSupport { landing, .. } | Self::Finishing { landing, .. } => landing.as_mut(),
             Self::Standing { .. } | Self::ShiftingWeight { .. } => None,
         }
     }

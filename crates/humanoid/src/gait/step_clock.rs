@@ -51,6 +51,12 @@ impl StepTiming {
         self.lift_off(step_index) + self.single_support
     }
 
+    /// In which tick of its first step a walk begins that somebody falls without.
+    pub fn hurried_start(&self) -> u64 {
+        // Weight is not shifted in no time.
+        self.lift_off(0) - self.first_shift / 4
+    }
+
     /// Ticks from the last landing to the end of the rest.
     pub fn finish(&self) -> u64 {
         self.double_support + self.rest
@@ -111,6 +117,23 @@ impl StepClock {
             }
             Self::Finishing { tick } if tick + 1 < timing.finish() => Self::Finishing { tick: tick + 1 },
             Self::Finishing { .. } => Self::Standing,
+        }
+    }
+
+    /// The same tick of a step that is to land in `ticks`, if a foot is in the air or a walk begins: what lies between is
+    /// left out. A landing is never put off.
+    pub(super) fn hurried(self, timing: &StepTiming, ticks: u64) -> Self {
+        match self {
+            Self::Stepping { step_index, tick_in_step, swing, will_continue }
+                if tick_in_step >= timing.lift_off(step_index) || (step_index, tick_in_step) == (0, 0) =>
+            {
+                let mut latest = timing.step(step_index).saturating_sub(ticks.max(1));
+                if tick_in_step < timing.lift_off(step_index) {
+                    latest = latest.min(timing.hurried_start());
+                }
+                Self::Stepping { step_index, tick_in_step: tick_in_step.max(latest), swing, will_continue }
+            }
+            clock => clock,
         }
     }
 

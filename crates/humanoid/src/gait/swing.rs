@@ -2,7 +2,7 @@
 
 use super::ground_pose::{GroundPose, wrap};
 use mikoshi_spatial::{Foot, Pose, Twist, World};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Where a foot is commanded to stand.
@@ -49,6 +49,8 @@ pub struct SwingConfig {
     pub contact_from: f64,
     /// Speed at which a foot that has found no ground is lowered further \[m/s\].
     pub lowering_m_s: f64,
+    /// Speed at which a foot that has landed reaches down to ground that does not bear \[m/s\].
+    pub reaching_m_s: f64,
     /// How far below the plane it is lowered at most \[m\].
     pub lowering_max_m: f64,
 }
@@ -60,9 +62,10 @@ impl Default for SwingConfig {
             touchdown_m: 0.001,
             contact_force_n: 30.0,
             contact_ticks: 2,
-            plane_tolerance_m: 0.006,
+            plane_tolerance_m: 0.003,
             contact_from: 0.7,
             lowering_m_s: 0.02,
+            reaching_m_s: 0.04,
             lowering_max_m: 0.02,
         }
     }
@@ -129,12 +132,48 @@ pub struct Swing {
     pub to: Foothold,
     /// Its contact.
     pub contact: SwingContact,
+    /// How it moves where its way was changed while it swings; as [`swing_foot`] has it when absent.
+    pub bent: Option<BentSwing>,
+    /// What has been changed.
+    pub change: SwingChange,
+}
+
+/// What a robot in trouble has changed of a swing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SwingChange {
+    /// By how far the foothold was moved \[m, world\].
+    pub moved: Vector2<f64>,
+    /// b of [`StepAdjustment`](super::StepAdjustment).
+    pub offset: Option<Vector2<f64>>,
+    /// In how many ticks from the end of the last one the foot had better land; 0: as planned.
+    pub land_in_ticks: u64,
 }
 
 impl Swing {
     /// At lift-off.
     pub fn new(from: Foothold, to: Foothold) -> Self {
-        Self { from, to, contact: SwingContact::Swinging { force_ticks: 0 } }
+        Self {
+            from,
+            to,
+            contact: SwingContact::Swinging { force_ticks: 0 },
+            bent: None,
+            change: SwingChange::default(),
+        }
+    }
+
+    /// Goes on from where the foot is at share `s` of its swing, on a way of its own.
+    pub fn bend(&mut self, config: &SwingConfig, s: f64, duration: f64) {
+        if self.bent.is_none() {
+            self.bent = Some(BentSwing::of(&self.from, &self.end(config), config.lift_m, s, duration));
+        }
+    }
+
+    /// A tick of a swing that was bent, at the end of which `seconds_left` of it are left.
+    pub fn advance(&mut self, config: &SwingConfig, seconds_left: f64, dt: f64) {
+        let end = self.end(config);
+        if let (Some(bent), SwingContact::Swinging { .. }) = (&mut self.bent, self.contact) {
+            bent.advance(&end, seconds_left, dt);
+        }
     }
 
     /// Where the swing ends, over its foothold.
@@ -159,7 +198,7 @@ impl Swing {
                 let force_ticks = if s >= config.contact_from { count(force_ticks) } else { 0 };
                 // Where the foot was while it felt the ground, not where this tick would take it.
                 let at = |s: f64| {
-                    let (pose, _) = swing_foot(&self.from, &self.end(config), config.lift_m, s, duration);
+                    let (pose, _) = self.in_the_air(config, s, duration);
                     Foothold { pose: GroundPose::of(&pose), height: pose.translation.z }
                 };
                 if force_ticks >= config.contact_ticks {
@@ -190,14 +229,120 @@ impl Swing {
     /// Pose and velocity at share `s` of the swing.
     pub fn foot(&self, config: &SwingConfig, s: f64, duration: f64) -> (Pose<World, Foot>, Twist<World>) {
         match self.contact {
-            SwingContact::Swinging { .. } => {
-                swing_foot(&self.from, &self.end(config), config.lift_m, s, duration)
-            }
+            SwingContact::Swinging { .. } => self.in_the_air(config, s, duration),
             SwingContact::Landed { at } => (at.in_world(), Twist::zero()),
             SwingContact::Lowering { at } => {
                 let speed = if at.height > -config.lowering_max_m { -config.lowering_m_s } else { 0.0 };
                 (at.in_world(), Twist::new(Vector3::new(0.0, 0.0, speed), Vector3::zeros()))
             }
         }
+    }
+
+    fn in_the_air(&self, config: &SwingConfig, s: f64, duration: f64) -> (Pose<World, Foot>, Twist<World>) {
+        match &self.bent {
+            Some(bent) => bent.foot(),
+            None => swing_foot(&self.from, &self.end(config), config.lift_m, s, duration),
+        }
+    }
+}
+
+/// A foot in the air whose foothold or time was changed: from tick to tick it goes on from where it is, as it moves,
+/// to where it shall be, in the time that is left. Where nothing changes any more, that is one quintic.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BentSwing {
+    /// Position and yaw, their rates and accelerations.
+    along: [Motion; 4],
+    /// Until the foot is as high as it gets \[s\].
+    rise_s: f64,
+    /// How high that is \[m\].
+    apex_m: f64,
+}
+
+/// A coordinate with its rate and acceleration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Motion {
+    at: f64,
+    rate: f64,
+    acceleration: f64,
+}
+
+/// How fast a foot rises that has less time than it was to have \[m/s\], on average.
+const HURRIED_RISE_M_S: f64 = 0.3;
+
+impl Motion {
+    /// After `dt` of the quintic that comes to rest at `to` in `seconds`.
+    fn towards(self, to: f64, seconds: f64, dt: f64) -> Self {
+        if seconds <= dt * 1.000_001 {
+            return Self { at: to, rate: 0.0, acceleration: 0.0 };
+        }
+        let (way, v, a) = (to - self.at, self.rate * seconds, self.acceleration * seconds * seconds);
+        let third = way * 10.0 - v * 6.0 - a * 1.5;
+        let fourth = way * -15.0 + v * 8.0 + a * 1.5;
+        let fifth = way * 6.0 - v * 3.0 - a * 0.5;
+        let s = dt / seconds;
+        let at = self.at + (v + (a * 0.5 + (third + (fourth + fifth * s) * s) * s) * s) * s;
+        let rate = v + (a + (third * 3.0 + (fourth * 4.0 + fifth * 5.0 * s) * s) * s) * s;
+        let acceleration = a + (third * 6.0 + (fourth * 12.0 + fifth * 20.0 * s) * s) * s;
+        Self { at, rate: rate / seconds, acceleration: acceleration / (seconds * seconds) }
+    }
+}
+
+impl BentSwing {
+    /// At share `s` of a swing as [`swing_foot`] has it.
+    fn of(from: &Foothold, to: &Foothold, lift: f64, s: f64, duration: f64) -> Self {
+        let s = s.clamp(0.0, 1.0);
+        let (pose, twist) = swing_foot(from, to, lift, s, duration);
+        // Second derivative of the quintic.
+        let bow = |s: f64| 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s);
+        let apex_m = from.height.max(to.height) + lift;
+        let rise = if s < 0.5 {
+            (apex_m - from.height) * bow(2.0 * s)
+        } else {
+            (apex_m - to.height) * bow(2.0 - 2.0 * s)
+        } * 4.0;
+        let per_s2 = 1.0 / (duration * duration);
+        let way = to.pose.position - from.pose.position;
+        let turn = wrap(to.pose.yaw - from.pose.yaw);
+        let motion = |at, rate, bow: f64| Motion { at, rate, acceleration: bow * per_s2 };
+        Self {
+            along: [
+                motion(pose.translation.x, twist.linear.x, way.x * bow(s)),
+                motion(pose.translation.y, twist.linear.y, way.y * bow(s)),
+                motion(pose.translation.z, twist.linear.z, rise),
+                motion(GroundPose::of(&pose).yaw, twist.angular.z, turn * bow(s)),
+            ],
+            rise_s: (0.5 - s) * duration,
+            apex_m,
+        }
+    }
+
+    /// The swing is to end in `seconds_left`, sooner than it was to.
+    pub fn hurry(&mut self, seconds_left: f64) {
+        if self.rise_s > 0.4 * seconds_left {
+            self.rise_s = 0.4 * seconds_left;
+            let [_, _, z, _] = &self.along;
+            self.apex_m = self.apex_m.min(z.at + HURRIED_RISE_M_S * self.rise_s);
+        }
+    }
+
+    fn advance(&mut self, end: &Foothold, seconds_left: f64, dt: f64) {
+        let seconds = seconds_left + dt;
+        let [x, y, z, yaw] = &mut self.along;
+        *x = x.towards(end.pose.position.x, seconds, dt);
+        *y = y.towards(end.pose.position.y, seconds, dt);
+        *yaw = yaw.towards(yaw.at + wrap(end.pose.yaw - yaw.at), seconds, dt);
+        *z = if self.rise_s > dt {
+            z.towards(self.apex_m, self.rise_s, dt)
+        } else {
+            z.towards(end.height, seconds, dt)
+        };
+        self.rise_s -= dt;
+    }
+
+    fn foot(&self) -> (Pose<World, Foot>, Twist<World>) {
+        let [x, y, z, yaw] = &self.along;
+        let pose = GroundPose::new(x.at, y.at, yaw.at).at_height(z.at);
+        let linear = Vector3::new(x.rate, y.rate, z.rate);
+        (pose, Twist::new(linear, Vector3::new(0.0, 0.0, yaw.rate)))
     }
 }

@@ -31,12 +31,20 @@ pub struct StepWish {
     pub first_swing: Side,
     /// Its largest foot error as a multiple of the starting threshold: whose first foot counts.
     pub urgency: f64,
+    /// In how many ticks its swinging foot, or its first one, had better have landed; 0: as the clock has it.
+    pub land_in_ticks: u64,
 }
 
 impl StepWish {
     /// A robot that needs nothing and is in nobody's way.
-    pub const CONTENT: Self =
-        Self { wants_step: false, can_stop: true, ready: true, first_swing: Side::Right, urgency: 0.0 };
+    pub const CONTENT: Self = Self {
+        wants_step: false,
+        can_stop: true,
+        ready: true,
+        first_swing: Side::Right,
+        urgency: 0.0,
+        land_in_ticks: 0,
+    };
 }
 
 /// The team's step clock and how long it has waited.
@@ -75,7 +83,9 @@ impl TeamClock {
             }
             clock => clock.successor(timing, continues),
         };
-        Self { clock, waited: 0 }
+        // Who falls can't wait, and all land with him: from the next tick on the swing takes the time that is left.
+        let wanted = wishes.iter().map(|wish| wish.land_in_ticks).filter(|&ticks| ticks > 0).min();
+        Self { clock: wanted.map_or(clock, |ticks| clock.hurried(timing, ticks)), waited: 0 }
     }
 }
 

@@ -75,6 +75,15 @@ impl ZmpReference {
         self
     }
 
+    /// The same with what grows by `slope` in a tick, from now to `until` and not further.
+    pub fn with_drift(self, slope: &Vector2<f64>, until: i64) -> Self {
+        let mut drifting = self.shift(until, until, self.last());
+        for (tick, point) in drifting.knots.iter_mut().take(drifting.count) {
+            *point += slope * (*tick).clamp(-until, until) as f64;
+        }
+        drifting
+    }
+
     /// The reference in the ticks `from..to`, from >= 0, as lines in order of time.
     pub(super) fn lines(&self, from: i64, to: i64) -> impl Iterator<Item = Line> + '_ {
         let ends = self.knots().windows(2).map(|pair| Some((pair[0], pair[1])));

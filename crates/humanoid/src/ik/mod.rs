@@ -75,6 +75,9 @@ pub struct IkGains {
     /// Speed limit of joints that move one hand and nothing else, where it is below the model's
     /// \[rad/s\].
     pub arm_speed: Option<f64>,
+    /// Largest acceleration of joints that are neither a leg's nor one arm's \[rad/s²\]: trunk and head would be thrown about
+    /// for the sake of a leg that can't follow.
+    pub trunk_acceleration: f64,
 }
 
 impl Default for IkGains {
@@ -93,6 +96,7 @@ impl Default for IkGains {
             repulsion_zone: 0.15,
             repulsion_step: 0.005,
             arm_speed: None,
+            trunk_acceleration: 5.0,
         }
     }
 }
@@ -238,6 +242,8 @@ pub struct WholeBodyIk {
     config: IkConfig,
     /// Largest increment of each joint in a tick.
     speed_step: [f64; MAX_JOINTS],
+    /// Joints of the trunk.
+    trunk: u64,
 }
 
 /// Workspace of [`WholeBodyIk`]; it allocates at construction and never after.
@@ -300,18 +306,19 @@ impl WholeBodyIk {
             ("limit_approach", gains.limit_approach),
             ("repulsion_zone", gains.repulsion_zone),
             ("arm_speed", gains.arm_speed.unwrap_or(1.0)),
+            ("trunk_acceleration", gains.trunk_acceleration),
         ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(ConfigureIkError::NotPositive { name, value });
             }
         }
-        let arms = arm_joints(model, &config);
+        let (arms, trunk) = arm_and_trunk_joints(model, &config);
         let mut speed_step = [0.0; MAX_JOINTS];
         for (j, joint) in model.joints().iter().enumerate() {
             let cap = gains.arm_speed.filter(|_| arms >> j & 1 == 1).unwrap_or(f64::INFINITY);
             speed_step[j] = joint.velocity.min(cap) * config.period_s;
         }
-        Ok(Self { config, speed_step })
+        Ok(Self { config, speed_step, trunk })
     }
 
     /// What it was made from.
@@ -338,7 +345,8 @@ impl WholeBodyIk {
         scratch: &mut IkScratch,
         targets: &IkTargets,
     ) -> Result<IkReport, SolveIkError> {
-        self.step(model, state, scratch, targets, &self.speed_step)
+        let gain = self.config.gains.trunk_acceleration * self.config.period_s;
+        self.step(model, state, scratch, targets, (&self.speed_step, gain))
     }
 
     fn step(
@@ -347,12 +355,12 @@ impl WholeBodyIk {
         state: &mut IkState,
         scratch: &mut IkScratch,
         targets: &IkTargets,
-        speed_step: &[f64; MAX_JOINTS],
+        limits: (&[f64; MAX_JOINTS], f64),
     ) -> Result<IkReport, SolveIkError> {
         let X_WB = self.base_pose(model, &state.joint_position, targets);
         scratch.kinematics.update(model, &X_WB, &state.joint_position);
         self.pose_tasks(model, state, scratch, targets);
-        let at_position_bound = self.pose_bounds(model, state, scratch, speed_step);
+        let at_position_bound = self.pose_bounds(model, state, scratch, limits);
 
         let mut active = state.active;
         scratch.program.minimize(&mut active).map_err(|_| SolveIkError)?;
@@ -481,7 +489,7 @@ impl WholeBodyIk {
         model: &Model,
         state: &IkState,
         scratch: &mut IkScratch,
-        speed_step: &[f64; MAX_JOINTS],
+        (speed_step, trunk_gain): (&[f64; MAX_JOINTS], f64),
     ) -> u64 {
         let gains = &self.config.gains;
         let program = &mut scratch.program;
@@ -498,6 +506,14 @@ impl WholeBodyIk {
             // A joint beyond its margin comes back, as fast as its speed limit allows.
             program.upper[j] = to_upper.clamp(-speed, speed);
             program.lower[j] = to_lower.clamp(-speed, speed);
+            if self.trunk >> j & 1 == 1 {
+                // Limits of position go before.
+                let (lower, upper) = (program.lower[j], program.upper[j]);
+                let period_s = self.config.period_s;
+                let around = |gain: f64| (state.joint_velocity[j] + gain) * period_s;
+                program.lower[j] = around(-trunk_gain).clamp(lower, upper);
+                program.upper[j] = around(trunk_gain).clamp(lower, upper);
+            }
         }
         by_position
     }
@@ -559,8 +575,8 @@ pub fn joint_margin(model: &Model, joint_position: &[f64]) -> f64 {
     margins.map(|(joint, q)| (q - joint.lower).min(joint.upper - q)).fold(f64::INFINITY, f64::min)
 }
 
-/// The joints that move exactly one hand, and no foot.
-fn arm_joints(model: &Model, config: &IkConfig) -> u64 {
+/// The joints that move exactly one hand and no foot, and those that are neither such nor move a foot.
+fn arm_and_trunk_joints(model: &Model, config: &IkConfig) -> (u64, u64) {
     let path = |&frame: &FrameId| model.path(model.frame(frame).body);
     let feet = Side::BOTH.iter().fold(0, |set, &side| set | path(&config.feet[side]));
     let (mut once, mut more) = (0, 0);
@@ -568,5 +584,6 @@ fn arm_joints(model: &Model, config: &IkConfig) -> u64 {
         more |= once & hand;
         once |= hand;
     }
-    once & !more & !feet
+    let arms = once & !more & !feet;
+    (arms, !arms & !feet)
 }

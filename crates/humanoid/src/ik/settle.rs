@@ -84,7 +84,7 @@ impl WholeBodyIk {
         let mut report = None;
         for _ in 0..MOST_STEPS {
             let step = self
-                .step(model, &mut state, scratch, targets, &[LARGEST_STEP; MAX_JOINTS])
+                .step(model, &mut state, scratch, targets, (&[LARGEST_STEP; MAX_JOINTS], f64::INFINITY))
                 .map_err(|_| SettlePostureError::NotFinite)?;
             report = Some(step);
             if state.joint_velocity.iter().all(|rate| (rate * self.config.period_s).abs() < STILL) {

@@ -106,7 +106,15 @@ impl Robot {
                 GroundPose { position: meant.position + off, ..meant }
             })
         });
-        let inputs = GaitInputs { clock, hand_centre: Some(self.centre), foot_force, soles, load };
+        let inputs = GaitInputs {
+            clock,
+            hand_centre: Some(self.centre),
+            foot_force,
+            soles,
+            sole_heights: None,
+            load,
+            divergent_component: None,
+        };
         self.gait.act(&mut self.state, &inputs)
     }
 }

@@ -55,6 +55,7 @@ pub fn run(label: &str, kind: Kind) -> ReportedRun {
         robots: judged.robots,
         drift_between_robots_m: judged.drift_between_robots_m,
         minutes: judged.minutes,
+        load: judged.load,
         ..Summary::default()
     };
     let limit = |what: &str, measured: &str, is_met| JudgedLimit {

@@ -4,6 +4,9 @@
 //! publisher that finds nobody asleep then makes no system call.
 
 mod calls;
+mod link;
+
+pub use link::{IceoryxLink, LinkBell, LinkError, Outlet, StandIn};
 
 use super::accept::{Verdict, judge};
 use super::{
@@ -112,6 +115,8 @@ pub(super) struct Process {
     run: PathBuf,
     domain: Domain,
     ports: Ports,
+    /// Where the link sleeps, if there is one.
+    link: Option<usize>,
 }
 
 /// All ports of a process, to be connected before the first tick and whenever a process has taken another
@@ -144,16 +149,19 @@ impl Process {
                 path: run.display().to_string(),
                 reason: error.to_string(),
             })?;
+        domain.close_to_others().map_err(DomainError::NoSharedMemory)?;
         let ports = Ports::default();
         let to_connect = ports.clone();
         member.on_successor(move || to_connect.connect());
         let run = run.to_path_buf();
         let pace = match member.role() {
             Role::Service(service) => Pace::of(schedule, service),
-            Role::Supervisor | Role::Tap => None,
+            Role::Supervisor | Role::Tap | Role::Link => None,
         };
+        let link = member.board().index_of(Role::Link);
         Ok(Rc::new(Self {
             node,
+            link,
             member,
             schedule: schedule.clone(),
             pace,
@@ -405,7 +413,7 @@ impl Transport for IceoryxTransport {
 
     fn operator(&self) -> OperatorPort {
         let process = Rc::clone(&self.process);
-        OperatorPort(Box::new(move || process.member.board().operator_word()))
+        OperatorPort(Box::new(move |last| process.member.board().operator_input(last)))
     }
 }
 
@@ -541,6 +549,8 @@ pub struct IceoryxTap {
     process: Rc<Process>,
     opener: Option<usize>,
     consumed: Rc<Cell<u64>>,
+    /// Whether no tick had begun when it was connected.
+    is_early: Cell<bool>,
 }
 
 impl IceoryxTap {
@@ -554,7 +564,7 @@ impl IceoryxTap {
         let process = Process::open(run, member, schedule)?;
         let opener =
             schedule.phases().first().and_then(|phase| process.slot_of(Role::Service(phase.service)));
-        Ok(Self { process, opener, consumed: Rc::default() })
+        Ok(Self { process, opener, consumed: Rc::default(), is_early: Cell::default() })
     }
 
     /// Meets all services before the first tick, once all observers have been made. It does not block
@@ -564,6 +574,9 @@ impl IceoryxTap {
     /// A process is lost, the run is to stop, or shared memory is full.
     pub fn start(&self) -> Result<(), TickError> {
         self.process.prepare()?;
+        let opener = self.opener.and_then(|index| self.process.member.board().slots().get(index));
+        // Those who are not yet to execute ticks have seen it come, and wait for it.
+        self.is_early.set(opener.is_some_and(|slot| slot.state() < State::Running));
         // No tick begins before the tap is ready, and it can begin whenever the services do.
         self.process.member.enter(State::Running);
         Ok(())
@@ -573,7 +586,7 @@ impl IceoryxTap {
     /// once all services are connected to it; none before they are.
     pub fn first_tick(&self) -> Option<u64> {
         let member = &self.process.member;
-        if member.epoch() == 1 {
+        if self.is_early.get() {
             return Some(0);
         }
         let opener = member.board().slots().get(self.opener?)?;

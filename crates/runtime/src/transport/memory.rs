@@ -12,7 +12,7 @@ use crate::board::Charge;
 use crate::{Position, TickError, TickSchedule, Topic};
 use core::any::Any;
 use core::cell::{Cell, RefCell};
-use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
+use mikoshi_ipc_types::{Envelope, Frame, OperatorInput, Payload, ServiceId, ServicePayload};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -28,7 +28,7 @@ pub struct InMemoryHub {
 struct Shared {
     schedule: TickSchedule,
     channels: RefCell<BTreeMap<Topic, Rc<dyn Any>>>,
-    operator: Cell<u64>,
+    operator: Cell<OperatorInput>,
 }
 
 impl InMemoryHub {
@@ -42,9 +42,9 @@ impl InMemoryHub {
         InMemoryTransport { hub: self.clone(), service }
     }
 
-    /// Makes this the operator's last word.
-    pub fn set_operator_word(&self, word: u64) {
-        self.shared.operator.set(word);
+    /// Makes this what the operator says.
+    pub fn set_operator(&self, input: OperatorInput) {
+        self.shared.operator.set(input);
     }
 
     /// The ports of an observer.
@@ -144,7 +144,7 @@ impl Transport for InMemoryTransport {
 
     fn operator(&self) -> OperatorPort {
         let shared = Rc::clone(&self.hub.shared);
-        OperatorPort(Box::new(move || shared.operator.get()))
+        OperatorPort(Box::new(move |_| shared.operator.get()))
     }
 }
 

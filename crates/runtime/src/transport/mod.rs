@@ -34,7 +34,7 @@ pub mod memory;
 pub use in_order::InOrder;
 
 use crate::{Clock, TickError, TickSchedule, Topic};
-use mikoshi_ipc_types::{Frame, Payload, ServiceId, ServicePayload};
+use mikoshi_ipc_types::{Frame, OperatorInput, Payload, ServiceId, ServicePayload};
 
 /// Ticks that an observer may fall behind before it loses frames.
 pub const OBSERVER_DEPTH: usize = 64;
@@ -76,19 +76,19 @@ pub trait Transport {
     fn operator(&self) -> OperatorPort;
 }
 
-/// Hears the operator, whose words come at any time: whoever hears one says in which tick, so that a replay
-/// can hear it in the same.
-pub struct OperatorPort(pub(crate) Box<dyn Fn() -> u64>);
+/// Hears the operator, who speaks at any time: whoever hears it says in which tick, so that a replay can hear it in
+/// the same.
+pub struct OperatorPort(pub(crate) Box<dyn Fn(&OperatorInput) -> OperatorInput>);
 
 impl OperatorPort {
     /// Where nobody speaks.
     pub fn silent() -> Self {
-        Self(Box::new(|| 0))
+        Self(Box::new(|last| *last))
     }
 
-    /// What the operator has said last: [`TeamState::operator_word`](mikoshi_ipc_types::TeamState).
-    pub fn word(&self) -> u64 {
-        (self.0)()
+    /// What the operator says now, after it was heard to say `last`; that again, where nothing can be made out.
+    pub fn hear(&self, last: &OperatorInput) -> OperatorInput {
+        (self.0)(last)
     }
 }
 

@@ -18,7 +18,7 @@ pub fn adopt(arguments: &AdoptArguments) -> Result<Status, Failure> {
     let directory = find_run_that(arguments.run.as_deref(), "runs without a supervisor", has_none)?;
     let run = read_run(&directory).map_err(Failure::fault)?;
     let prepared = prepare_resolved(run)?;
-    carry_out(&prepared, &arguments.results, |prepared, out, observer| {
+    carry_out(&prepared, &arguments.results, arguments.json, false, |prepared, out, observer| {
         supervisor::adopt(&directory, prepared, out, observer)
     })
 }

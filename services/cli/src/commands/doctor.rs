@@ -3,7 +3,7 @@
 use crate::arguments::DoctorArguments;
 use crate::binaries;
 use crate::failure::{Failure, Status};
-use crate::print::print_out;
+use crate::print::{print_json, print_out};
 use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId};
 use mikoshi_runtime::{Domain, Placement, RunDirectory, TickSchedule, required_bytes};
 use rustix::process::{Resource, getrlimit};
@@ -39,9 +39,7 @@ pub fn doctor(arguments: &DoctorArguments) -> Result<Status, Failure> {
         check_frequency(),
     ];
     if arguments.json {
-        let mut text = serde_json::to_string_pretty(&checks).map_err(Failure::fault)?;
-        text.push('\n');
-        print_out(&text);
+        print_json(&checks)?;
     } else {
         print_out(&checks.iter().map(Check::to_text).collect::<String>());
     }

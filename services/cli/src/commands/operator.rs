@@ -3,7 +3,7 @@
 use crate::arguments::OperatorArguments;
 use crate::control::{Request, ask, find_run};
 use crate::failure::Failure;
-use crate::print::print_out;
+use crate::print::print_message;
 use mikoshi_ipc_types::operator;
 use mikoshi_runtime::Board;
 
@@ -34,6 +34,5 @@ fn say(arguments: &OperatorArguments, request: &Request, word: u64, verb: &str) 
             format!("the team is told to {verb}; its supervisor is gone: `mikoshi adopt` looks after it")
         }
     };
-    print_out(&format!("{message}\n"));
-    Ok(())
+    print_message(&message, arguments.json)
 }

@@ -1,11 +1,12 @@
 //! `mikoshi plan`: what a scenario comes to, before anything runs.
 
 use crate::arguments::PlanArguments;
+use crate::burden::{RobotBurden, burdens};
 use crate::failure::{Failure, as_lines};
 use crate::fraction::Fraction;
 use crate::gain::GainReport;
 use crate::prepare::{Prepared, prepare};
-use crate::print::{print_error, print_out};
+use crate::print::{print_error, print_json, print_out};
 use crate::pull::{Pull, pulls};
 use crate::table;
 use core::fmt::Write as _;
@@ -24,13 +25,12 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     let prepared = prepare(&arguments.scenario)?;
     let plan = Plan::of(&prepared)?;
     if arguments.json {
-        let mut text = serde_json::to_string_pretty(&plan).map_err(Failure::fault)?;
-        text.push('\n');
-        print_out(&text);
+        print_json(&plan)?;
     } else {
         print_out(&plan.to_text(&prepared));
     }
-    if let Some(warning) = plan.gains.warning() {
+    let burdens = plan.burdens.iter().filter_map(RobotBurden::warning);
+    for warning in plan.gains.warning().into_iter().chain(burdens) {
         print_error(&as_lines("warning", &warning));
     }
     Ok(())
@@ -52,6 +52,7 @@ struct Plan<'a> {
     matrices: Matrices,
     gains: GainReport,
     pulls: Vec<Pull>,
+    burdens: Vec<RobotBurden>,
     schedule: Vec<Phase>,
     shared_memory_bytes: u64,
     thresholds: &'a Thresholds,
@@ -118,6 +119,7 @@ impl<'a> Plan<'a> {
             },
             gains: GainReport::of(prepared),
             pulls: pulls(run)?,
+            burdens: burdens(run)?,
             schedule: schedule(prepared),
             shared_memory_bytes: required_bytes(&prepared.schedule),
             thresholds: &scenario.thresholds,
@@ -176,6 +178,8 @@ impl<'a> Plan<'a> {
             "Standing robots pulled by a leader of their kind (eq. 42): until the ZMP is at their toes",
         );
         text += &pulls_table(&self.pulls);
+        title(&mut text, "What robots bear: at rest, in the posture in which they begin");
+        text += &burdens_table(&self.burdens);
         title(&mut text, "Schedule of a tick");
         text += &prepared.schedule.to_string();
         title(&mut text, "Limits");
@@ -296,6 +300,18 @@ fn pulls_table(pulls: &[Pull]) -> String {
     };
     let titles = ["robot", "k [N/m]", "Pmax [m]", "Za [m]", "x [m]", "t [s]"];
     table::of_numbers(&titles, pulls.iter().map(cells))
+}
+
+fn burdens_table(burdens: &[RobotBurden]) -> String {
+    let cells = |burden: &RobotBurden| {
+        vec![
+            burden.robot.clone(),
+            format!("{:.1}", burden.force_n),
+            format!("{:.0} % ({})", 100.0 * burden.torque_share, burden.joint),
+            format!("{:.0}", burden.bearable_n),
+        ]
+    };
+    table::of_numbers(&["robot", "load N", "torque", "can bear N"], burdens.iter().map(cells))
 }
 
 fn matrix_table(rows: &[String], columns: &[String], matrix: &[Vec<f64>]) -> String {

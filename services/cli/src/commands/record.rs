@@ -1,17 +1,18 @@
 //! `mikoshi record`: the frames of a run that goes on, in a file of their own.
 
 use crate::arguments::RecordArguments;
+use crate::aside::step_aside;
 use crate::control::find_run;
 use crate::failure::{Failure, Status, as_lines};
-use crate::feed::{Heard, Listener, Wish};
+use crate::feed::{Heard, Wish};
 use crate::interrupts::Interrupts;
-use crate::observed_run::observed_run;
 use crate::output_directory::refuse_to_overwrite;
-use crate::print::{print_error, print_out};
-use mikoshi_coordinator::build_hybrid_law;
+use crate::print::{print_error, print_json, print_out};
+use crate::watched_run::WatchedRun;
+use mikoshi_config::scenario::Clock;
 use mikoshi_recording::Recording;
-use mikoshi_resolution::{read_run, world_file};
-use std::io::ErrorKind;
+use mikoshi_resolution::world_file;
+use serde::Serialize;
 use std::path::Path;
 
 /// Records from the next tick on, until the run ends or somebody interrupts.
@@ -21,22 +22,20 @@ use std::path::Path;
 pub fn record(arguments: &RecordArguments) -> Result<Status, Failure> {
     let interrupts = Interrupts::listen().map_err(Failure::fault)?;
     let directory = find_run(arguments.run.as_deref())?;
-    let run = read_run(&directory).map_err(Failure::fault)?;
     let out = arguments.out.as_path();
     refuse_to_overwrite(out, arguments.force)?;
-    let connected = Listener::connect(&directory, run.robots.len(), Wish::All);
-    let mut listener = connected.map_err(|error| match error.kind() {
-        ErrorKind::ConnectionRefused | ErrorKind::NotFound => {
-            Failure::usage("the run's supervisor is gone: `mikoshi adopt` looks after it")
-        }
-        _ => Failure::fault(error),
-    })?;
+    let mut watched = WatchedRun::listen(&directory, Wish::All)?;
+    let scenario = &watched.run.scenario;
+    // In lockstep the run waits for it.
+    if scenario.clock == Clock::Wall {
+        step_aside(&scenario.placement);
+    }
     let world = world_file(&directory);
-    let observed = observed_run(&run, build_hybrid_law(&run).map_err(Failure::fault)?.internal_forces())?;
-    let mut log = Recording::create(out, &run, &observed, arguments.views.view_hz).map_err(Failure::fault)?;
+    let mut log = Recording::create(out, &watched.run, &watched.observed, arguments.views.view_hz)
+        .map_err(Failure::fault)?;
     let (mut ticks, mut lost) = (None, 0);
     let ended = loop {
-        match listener.hear().map_err(Failure::fault)? {
+        match watched.hear()? {
             Heard::Tick(observation) => {
                 log.write(observation).map_err(Failure::fault)?;
                 let (first, _) = ticks.unwrap_or((observation.tick(), 0));
@@ -55,7 +54,14 @@ pub fn record(arguments: &RecordArguments) -> Result<Status, Failure> {
         }
     };
     log.finish(&world).map_err(Failure::fault)?;
-    if !arguments.quiet {
+    if arguments.json {
+        print_json(&Recorded {
+            first_tick: ticks.map(|(first, _)| first),
+            last_tick: ticks.map(|(_, last)| last),
+            ticks_lost: lost,
+            out,
+        })?;
+    } else if !arguments.quiet {
         print_out(&tell(ticks, lost, out));
     }
     match ended {
@@ -67,6 +73,15 @@ pub fn record(arguments: &RecordArguments) -> Result<Status, Failure> {
             Ok(Status::NotMet)
         }
     }
+}
+
+/// What `mikoshi record --json` prints.
+#[derive(Debug, Serialize)]
+struct Recorded<'a> {
+    first_tick: Option<u64>,
+    last_tick: Option<u64>,
+    ticks_lost: u64,
+    out: &'a Path,
 }
 
 enum Ended {

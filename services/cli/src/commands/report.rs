@@ -5,7 +5,7 @@ use crate::failure::{Failure, as_lines};
 use crate::judge::judged_limits;
 use crate::observed_run::observed_run;
 use crate::output_directory::{REPORT, RUN_LOG, SUMMARY};
-use crate::print::{print_error, print_out};
+use crate::print::{print_error, print_file};
 use mikoshi_coordinator::build_hybrid_law;
 use mikoshi_observation::{LogReader, Observation, Summary};
 use mikoshi_report::{ReportedRun, RunData, WriteReportError, write_report};
@@ -33,8 +33,7 @@ pub fn report(arguments: &ReportArguments) -> Result<(), Failure> {
         WriteReportError::Io { .. } => Failure::usage(error),
         WriteReportError::Draw { .. } => Failure::fault(error),
     })?;
-    print_out(&format!("{}\n", page.display()));
-    Ok(())
+    print_file(&page, arguments.json)
 }
 
 /// Reads what a run has left in its folder.

@@ -1,13 +1,14 @@
 //! `mikoshi run`: a scenario from its file to its summary.
 
 use crate::arguments::{ResultsArguments, RunArguments};
+use crate::burden::{RobotBurden, burdens};
 use crate::failure::{Failure, Status, as_lines};
 use crate::gain::GainReport;
 use crate::observer::RunObserver;
 use crate::outcome::Outcome;
 use crate::output_directory::OutputDirectory;
 use crate::prepare::{Prepared, prepare_paced};
-use crate::print::{print_error, print_out};
+use crate::print::{print_error, print_json, print_out};
 use crate::report::report;
 use mikoshi_config::save_scenario;
 use mikoshi_observation::Summary;
@@ -22,18 +23,28 @@ pub fn run(
     arguments: &RunArguments,
     execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
 ) -> Result<Status, Failure> {
-    let prepared = prepare_paced(&arguments.scenario, arguments.real_time)?;
+    let mut prepared = prepare_paced(&arguments.scenario, arguments.real_time)?;
+    let bridge = arguments.bridge.as_ref();
+    let bridge =
+        bridge.map(|path| path.canonicalize().map_err(|error| Failure::usage(error).context(path.display())));
+    prepared.bridge = bridge.transpose()?;
     let scenario = &prepared.run.scenario;
     if let Some(warning) = scenario.is_controlled().then(|| GainReport::of(&prepared).warning()).flatten() {
         print_error(&as_lines("warning", &warning));
     }
-    carry_out(&prepared, &arguments.results, execute)
+    for warning in burdens(&prepared.run)?.iter().filter_map(RobotBurden::warning) {
+        print_error(&as_lines("warning", &warning));
+    }
+    carry_out(&prepared, &arguments.results, arguments.json, arguments.viewer, execute)
 }
 
-/// Has a run carried out by `execute`, judges it, and leaves its results.
+/// Has a run carried out by `execute`, judges it, and leaves its results; with a viewer, to be looked at until somebody
+/// interrupts.
 pub(super) fn carry_out(
     prepared: &Prepared,
     arguments: &ResultsArguments,
+    wants_json: bool,
+    has_viewer: bool,
     execute: impl FnOnce(&Prepared, &OutputDirectory, &mut RunObserver) -> Result<Outcome, Failure>,
 ) -> Result<Status, Failure> {
     let scenario = &prepared.run.scenario;
@@ -41,6 +52,9 @@ pub(super) fn carry_out(
     save_scenario(&prepared.run, &out.scenario()).map_err(Failure::fault)?;
 
     let mut observer = RunObserver::new(prepared, arguments, &out)?;
+    if has_viewer {
+        observer.expect_viewer();
+    }
     let outcome = match execute(prepared, &out, &mut observer) {
         Ok(outcome) => outcome,
         Err(failure) => {
@@ -53,12 +67,18 @@ pub(super) fn carry_out(
         Outcome::Fault { faults, .. } => faults.clone(),
         _ => vec![],
     };
+    let viewer = observer.viewer();
     let summary = observer.finish(&prepared.run, faults);
     write_summary(&out, &summary)?;
     match outcome {
         Outcome::Completed => {
-            if !arguments.quiet {
+            if wants_json {
+                print_json(&summary)?;
+            } else if !arguments.quiet {
                 print_out(&report(scenario, &summary, out.path()));
+            }
+            if let Some(viewer) = viewer {
+                viewer.stay()?;
             }
             Ok(if summary.passed { Status::Met } else { Status::NotMet })
         }

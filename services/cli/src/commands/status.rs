@@ -3,12 +3,18 @@
 use crate::arguments::StatusArguments;
 use crate::binaries::kind_of;
 use crate::failure::Failure;
-use crate::print::print_out;
+use crate::print::{print_json, print_out};
 use crate::table;
 use mikoshi_config::RunSpec;
 use mikoshi_resolution::read_run;
 use mikoshi_runtime::{Board, FoundRun, Role, RunDirectory, SlotStatus, State};
 use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+
+/// What a link writes, in the directory of its run.
+const LINK: &str = "link.json";
 
 /// Prints all runs of this user.
 ///
@@ -17,9 +23,7 @@ use serde::Serialize;
 pub fn status(arguments: &StatusArguments) -> Result<(), Failure> {
     let runs = runs()?;
     if arguments.json {
-        let mut text = serde_json::to_string_pretty(&runs).map_err(Failure::fault)?;
-        text.push('\n');
-        print_out(&text);
+        print_json(&runs)?;
     } else if runs.is_empty() {
         print_out("nothing runs\n");
     } else {
@@ -40,19 +44,22 @@ struct RunStatus {
     /// Whether its supervisor lives; otherwise it can be adopted.
     supervised: bool,
     processes: Vec<ProcessStatus>,
+    /// What the link of this host says, if there are others.
+    link: Option<Value>,
 }
 
 /// One process of a run.
 #[derive(Debug, Serialize)]
-struct ProcessStatus {
-    service: String,
-    robot: Option<String>,
-    pid: Option<u32>,
-    alive: bool,
-    epoch: u64,
-    tick: u64,
-    state: String,
-    fault: Option<String>,
+#[allow(missing_docs)]
+pub struct ProcessStatus {
+    pub service: String,
+    pub robot: Option<String>,
+    pub pid: Option<u32>,
+    pub alive: bool,
+    pub epoch: u64,
+    pub tick: u64,
+    pub state: String,
+    pub fault: Option<String>,
 }
 
 fn runs() -> Result<Vec<RunStatus>, Failure> {
@@ -79,7 +86,46 @@ impl RunStatus {
                 .filter(|slot| slot.state != State::Absent)
                 .map(|slot| ProcessStatus::of(slot, run.as_ref()))
                 .collect(),
+            link: fs::read(found.path.join(LINK)).ok().and_then(|text| serde_json::from_slice(&text).ok()),
         }
+    }
+
+    /// What is known of the other hosts, one a line.
+    fn of_hosts(&self) -> String {
+        let Some(link) = &self.link else { return String::new() };
+        let list = |of: &Value, key: &str| of[key].as_array().cloned().unwrap_or_default();
+        let ms =
+            |seconds: &Value| seconds.as_f64().map_or_else(|| "-".to_owned(), |s| format!("{:.2}", 1e3 * s));
+        let refused_of = |host: &Value| {
+            let of_host = list(link, "topics").into_iter().filter(|topic| topic["from"] == host["host"]);
+            let mut refused = BTreeMap::<String, u64>::new();
+            for (reason, count) in of_host.filter_map(|topic| topic["frames"].as_object().cloned()).flatten()
+            {
+                // That copies come is as it should be.
+                if !["accepted", "repeated"].contains(&reason.as_str()) {
+                    *refused.entry(reason).or_default() += count.as_u64().unwrap_or_default();
+                }
+            }
+            let mut refused: Vec<_> =
+                refused.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+            if host["is_of_another_run"] == true {
+                refused.push("all: it carries out another run".to_owned());
+            }
+            if refused.is_empty() { "-".to_owned() } else { refused.join(", ") }
+        };
+        let cells = |host: &Value| {
+            let name = host["host"].as_str().unwrap_or_default().to_owned();
+            let [heard, way, ahead] =
+                ["heard_s_ago", "round_trip_s", "clock_ahead_s"].map(|key| ms(&host[key]));
+            vec![name, heard, way, ahead, refused_of(host)]
+        };
+        let titles = ["host", "heard [ms]", "there and back [ms]", "clock ahead [ms]", "refused"];
+        let hosts = list(link, "hosts");
+        let fits = match link["fitting_delay_ticks"].as_u64() {
+            Some(ticks) => format!("coordination_delay_ticks that fits what was measured: {ticks}\n"),
+            None => String::new(),
+        };
+        format!("{}{fits}", table::of_text(&titles, hosts.iter().map(cells)))
     }
 
     fn to_text(&self) -> String {
@@ -110,12 +156,13 @@ impl RunStatus {
         };
         let titles = ["service", "robot", "pid", "epoch", "tick", "state"];
         let processes = table::of_text(&titles, self.processes.iter().map(cells));
-        format!("run {}{of_scenario}{hint}\n{processes}", self.run)
+        format!("run {}{of_scenario}{hint}\n{processes}{}", self.run, self.of_hosts())
     }
 }
 
 impl ProcessStatus {
-    fn of(slot: &SlotStatus, run: Option<&RunSpec>) -> Self {
+    /// By its slot on the board of this run.
+    pub fn of(slot: &SlotStatus, run: Option<&RunSpec>) -> Self {
         let (service, robot) = match slot.role {
             Role::Service(service) => (kind_of(service).to_owned(), service.robot()),
             other => (other.to_string(), None),

@@ -3,7 +3,7 @@
 use crate::arguments::SwapArguments;
 use crate::control::{Request, ask, find_run};
 use crate::failure::Failure;
-use crate::print::print_out;
+use crate::print::print_message;
 
 /// Asks a run's supervisor for it, and waits until the new process is in charge.
 ///
@@ -20,6 +20,5 @@ pub fn swap(arguments: &SwapArguments) -> Result<(), Failure> {
         program: program.transpose()?,
     };
     let message = ask(&run, &request)?;
-    print_out(&format!("{message}\n"));
-    Ok(())
+    print_message(&message, arguments.json)
 }

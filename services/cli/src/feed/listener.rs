@@ -1,6 +1,7 @@
 //! The other end: whoever wants to see a run.
 
 use super::{HEAD_BYTES, Kind, SOCKET, Wish};
+use crate::failure::Failure;
 use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
@@ -45,6 +46,19 @@ pub enum Heard<'a> {
     Nothing,
     /// Nobody speaks any more: the supervisor was killed, or has given this process up.
     Silence,
+}
+
+/// Listens to the supervisor of the run in this directory, for whoever was told to watch it.
+///
+/// # Errors
+/// The supervisor is gone: bad usage.
+pub fn listen_to(run: &Path, robots: usize, wish: Wish) -> Result<Listener, Failure> {
+    Listener::connect(run, robots, wish).map_err(|error| match error.kind() {
+        ErrorKind::ConnectionRefused | ErrorKind::NotFound => {
+            Failure::usage("the run's supervisor is gone: `mikoshi adopt` looks after it")
+        }
+        _ => Failure::fault(error),
+    })
 }
 
 impl Listener {

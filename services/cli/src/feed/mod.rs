@@ -18,7 +18,7 @@
 mod listener;
 mod server;
 
-pub use listener::{Heard, Listener};
+pub use listener::{Heard, Listener, listen_to};
 pub use server::Feed;
 
 const SOCKET: &str = "feed";

@@ -1,7 +1,7 @@
 //! The supervisor's end.
 
 use super::{HEAD_BYTES, Kind, SOCKET, Wish};
-use crate::socket::listen;
+use crate::socket::{accept, listen};
 use crate::wall_clock::{Stopwatch, pause};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
@@ -59,8 +59,7 @@ impl Feed {
     /// Lets listeners in, and sends what waits for them. It never waits.
     pub fn look(&mut self) {
         if self.listeners.len() < MAX_LISTENERS
-            && let Ok((stream, _)) = self.socket.accept()
-            && stream.set_nonblocking(true).is_ok()
+            && let Some(stream) = accept(&self.socket)
         {
             self.listeners.push(Listening {
                 stream,

@@ -14,7 +14,7 @@ use crate::observer::RunObserver;
 use crate::outcome::Outcome;
 use crate::output_directory::{LATENCY, OutputDirectory};
 use crate::prepare::prepare_paced;
-use crate::print::print_out;
+use crate::print::{print_json, print_out};
 use crate::supervisor;
 use core::time::Duration;
 pub use costs::Costs;
@@ -37,7 +37,11 @@ pub const WARM_UP_TICKS: u64 = 200;
 /// Bad usage or configuration, or a fault of the system.
 pub fn latency(arguments: &LatencyArguments) -> Result<Status, Failure> {
     if let [first, second] = &arguments.compare[..] {
-        print_out(&compare::compare(first, second)?);
+        let rows = compare::compare(first, second)?;
+        match arguments.json {
+            true => print_json(&rows)?,
+            false => print_out(&compare::to_text(&rows)),
+        }
         return Ok(Status::Met);
     }
     let Some(scenario) = arguments.scenario() else {

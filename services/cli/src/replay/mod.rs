@@ -4,9 +4,10 @@ mod difference;
 mod stage;
 
 use crate::arguments::ReplayArguments;
+use crate::binaries::kind_of;
 use crate::failure::{Failure, Status};
-use crate::outcome::{label_of, service_named};
-use crate::print::print_out;
+use crate::outcome::{label_of, robot_name, service_named};
+use crate::print::{print_json, print_out};
 use crate::revise::revise;
 use core::fmt::Write as _;
 use difference::Difference;
@@ -15,6 +16,7 @@ use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{LogReader, Observation, Revision, read_revisions};
 use mikoshi_resolution::tick_schedule;
 use mikoshi_runtime::{ConnectError, InMemoryTransport, Replaceable, TickError, TickSchedule};
+use serde::Serialize;
 use stage::Stage;
 
 /// What became of a service.
@@ -30,6 +32,35 @@ struct Verdict {
 enum Finding {
     Differs(Difference),
     Fails(String),
+}
+
+/// What `mikoshi replay --json` prints.
+#[derive(Debug, Serialize)]
+struct Replayed<'a> {
+    /// Whether all services said what they had said, and the log is whole.
+    passed: bool,
+    ticks: u64,
+    ticks_of_run: u64,
+    services: Vec<ReplayedService<'a>>,
+    damage: Option<Damage>,
+}
+
+/// One service.
+#[derive(Debug, Serialize)]
+struct ReplayedService<'a> {
+    service: &'static str,
+    robot: Option<&'a str>,
+    ticks_differing: u64,
+    first_tick: Option<u64>,
+    /// What differs there, or why it could not go on.
+    first: Option<String>,
+}
+
+/// Where the log is no log any more.
+#[derive(Debug, Serialize)]
+struct Damage {
+    after_ticks: u64,
+    problem: String,
 }
 
 /// `mikoshi replay`; `build` makes a service of a run on its ports.
@@ -93,9 +124,33 @@ pub fn replay(
         None => None,
     };
     let is_whole = damage.is_none();
-    let told = tell(&run, &schedule, &verdicts, ticks, damage);
-    print_out(&told);
+    match arguments.json {
+        true => print_json(&Replayed::of(&run, &verdicts, ticks, damage))?,
+        false => print_out(&tell(&run, &schedule, &verdicts, ticks, damage)),
+    }
     Ok(if is_same && is_whole { Status::Met } else { Status::NotMet })
+}
+
+impl<'a> Replayed<'a> {
+    fn of(run: &'a RunSpec, verdicts: &[Verdict], ticks: u64, damage: Option<(u64, String)>) -> Self {
+        let services = verdicts.iter().map(|Verdict { service, first, ticks }| ReplayedService {
+            service: kind_of(*service),
+            robot: robot_name(run, *service),
+            ticks_differing: *ticks,
+            first_tick: first.as_ref().map(|(tick, _)| *tick),
+            first: first.as_ref().map(|(_, finding)| match finding {
+                Finding::Differs(difference) => difference.to_string(),
+                Finding::Fails(error) => error.clone(),
+            }),
+        });
+        Self {
+            passed: damage.is_none() && verdicts.iter().all(|verdict| verdict.first.is_none()),
+            ticks,
+            ticks_of_run: run.ticks,
+            services: services.collect(),
+            damage: damage.map(|(after_ticks, problem)| Damage { after_ticks, problem }),
+        }
+    }
 }
 
 impl Verdict {

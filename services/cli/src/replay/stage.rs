@@ -2,8 +2,8 @@
 
 use super::difference::{Difference, first_difference};
 use mikoshi_ipc_types::{
-    Frame, JointCommand, ObjectTruth, Payload, RobotState, RobotTruth, Sensors, ServiceId, ServicePayload,
-    TeamCommand, TeamState,
+    Drive, Frame, JointCommand, ObjectTruth, OperatorInput, Payload, Push, RobotState, RobotTruth, Sensors,
+    ServiceId, ServicePayload, TeamCommand, TeamState,
 };
 use mikoshi_observation::{Observation, Observed};
 use mikoshi_runtime::{
@@ -109,7 +109,7 @@ impl Stage {
         recorded: &Observation,
         next: Option<&Observation>,
     ) -> Result<Option<Difference>, TickError> {
-        self.hub.set_operator_word(recorded.team_state.payload.operator_word);
+        self.hub.set_operator(heard_of_operator(recorded, next));
         self.tell(recorded, next)?;
         if self.oldest_use > 0 {
             self.recent.push_back(recorded.clone());
@@ -127,6 +127,19 @@ impl Stage {
         }
         Ok(first)
     }
+}
+
+/// What the operator had said by a tick. The world says in the `next` what it has heard.
+fn heard_of_operator(recorded: &Observation, next: Option<&Observation>) -> OperatorInput {
+    let team = &recorded.team_state.payload;
+    let drive = Drive { number: team.drive_number, twist: team.drive_twist, squeeze_n: team.drive_squeeze_n };
+    let push = next.map(|next| &next.object_truth.payload).map_or_else(Push::default, |truth| Push {
+        number: truth.heard_push_number,
+        target: truth.heard_push_target,
+        force_n: truth.heard_push_force_n,
+        ticks: truth.heard_push_ticks,
+    });
+    OperatorInput { word: team.operator_word, drive, push }
 }
 
 /// Whether a service heard what was said in `tick` when it needed it: who uses it says what it heard last. Where

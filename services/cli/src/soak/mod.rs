@@ -111,7 +111,9 @@ pub fn soak(arguments: &SoakArguments) -> Result<Status, Failure> {
     let json = serde_json::to_string_pretty(&result).map_err(Failure::fault)? + "\n";
     let file = out.join("soak.json");
     fs::write(&file, &json).map_err(|error| Failure::fault(error).context(file.display()))?;
-    if !arguments.quiet {
+    if arguments.json {
+        print_out(&json);
+    } else if !arguments.quiet {
         print_out(&result.to_text(&out));
     }
     Ok(if result.passed { Status::Met } else { Status::NotMet })

@@ -1,13 +1,15 @@
 //! Carries a run out with one process per service: starts or adopts them, records every tick, and sees to it that
-//! all end when one does.
+//! all end when one does. Where somebody else starts them it only attends: it records, and hears the operator.
 
 mod successors;
 mod verdict;
 
+use crate::awake::Awake;
 use crate::binaries;
 use crate::children::Children;
 use crate::failure::{Failure, as_lines};
 use crate::interrupts::Interrupts;
+use crate::meals::Meals;
 use crate::observer::RunObserver;
 use crate::outcome::{Outcome, label_of, robot_name};
 use crate::output_directory::OutputDirectory;
@@ -22,12 +24,13 @@ use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Observation, TeamTap};
+use mikoshi_process::notify;
 use mikoshi_resolution::{world_file, write_run};
 use mikoshi_runtime::{
     Board, Clock, Domain, Entry, IceoryxTap, Member, Position, Role, RunDirectory, State, TickError,
     WaitPolicy, required_bytes,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use verdict::{Stall, stalled};
@@ -57,6 +60,7 @@ pub fn supervise(
     let directory = RunDirectory::create(&base).map_err(Failure::fault)?;
     observer.open_feed(directory.path(), &prepared.run).map_err(Failure::fault)?;
     let supervisor = Supervisor::start(prepared, directory.path(), &out.service_logs())?;
+    observer.open_viewer(directory.path())?;
     Ok(supervisor.see_through(prepared, directory.path(), out, observer, &interrupts))
 }
 
@@ -72,14 +76,19 @@ pub fn adopt(
 ) -> Result<Outcome, Failure> {
     let interrupts = Interrupts::listen().map_err(Failure::fault)?;
     let directory = RunDirectory::adopt(run).map_err(Failure::fault)?;
-    let opened = observer.open_feed(directory.path(), &prepared.run).map_err(Failure::fault);
-    match opened.and_then(|()| Supervisor::adopt(prepared, directory.path(), &out.service_logs())) {
-        Ok(supervisor) => Ok(supervisor.see_through(prepared, directory.path(), out, observer, &interrupts)),
-        Err(failure) => {
-            directory.leave_as_it_is();
-            Err(failure)
-        }
+    let (path, logs) = (directory.path(), out.service_logs());
+    let is_kept = RunDirectory::is_kept(path);
+    let opened = observer.open_feed(path, &prepared.run).map_err(Failure::fault);
+    let supervisor = opened.and_then(|()| match is_kept {
+        true => Supervisor::attend(prepared, path, &logs),
+        false => Supervisor::adopt(prepared, path, &logs),
+    });
+    let outcome =
+        supervisor.map(|supervisor| supervisor.see_through(prepared, path, out, observer, &interrupts));
+    if is_kept || outcome.is_err() {
+        directory.leave_as_it_is();
     }
+    outcome
 }
 
 /// Why watching a run ended.
@@ -108,6 +117,10 @@ struct Supervisor {
     lost: BTreeSet<ServiceId>,
     /// Whether standbys have been seen to.
     stands_by: bool,
+    /// Where somebody else starts processes: which incarnations it knows of.
+    attended: Option<BTreeMap<ServiceId, u64>>,
+    /// While services run.
+    _awake: Option<Awake>,
 }
 
 impl Supervisor {
@@ -129,8 +142,7 @@ impl Supervisor {
         }
         // While services set themselves up.
         let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
-        let lost = BTreeSet::new();
-        Ok(Self { children, tap, team_tap, member, succession, requests, lost, stands_by: false })
+        Self::of(prepared, (member, tap), team_tap, requests, children, succession)
     }
 
     /// Processes are adopted last: until then nothing happens to them.
@@ -142,8 +154,42 @@ impl Supervisor {
         let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
         let requests = Requests::listen(directory).map_err(Failure::fault)?;
         let children = Children::adopt(directory, logs, services_of(prepared))?;
-        let lost = BTreeSet::new();
-        Ok(Self { children, tap, team_tap, member, succession, requests, lost, stands_by: false })
+        Self::of(prepared, (member, tap), team_tap, requests, children, succession)
+    }
+
+    /// Its processes are somebody else's: they are neither started nor ended, and nobody is given up.
+    fn attend(prepared: &Prepared, directory: &Path, logs: &Path) -> Result<Self, Failure> {
+        let (member, tap) = take_places(prepared, directory)?;
+        let team_tap = TeamTap::new(&tap, prepared.run.robots.len(), prepared.schedule.clock());
+        let team_tap = team_tap.map_err(Failure::fault)?;
+        let requests = Requests::listen(directory).map_err(Failure::fault)?;
+        notify::tell_ready("waits for the services");
+        let (children, succession) = (Children::of(directory, logs), Succession::with_limit(0));
+        let supervisor = Self::of(prepared, (member, tap), team_tap, requests, children, succession)?;
+        Ok(Self { attended: Some(BTreeMap::new()), ..supervisor })
+    }
+
+    /// With all that it takes, and nothing has happened yet.
+    fn of(
+        prepared: &Prepared,
+        (member, tap): (Member, IceoryxTap),
+        team_tap: TeamTap<IceoryxTap>,
+        requests: Requests,
+        children: Children,
+        succession: Succession,
+    ) -> Result<Self, Failure> {
+        Ok(Self {
+            children,
+            tap,
+            team_tap,
+            member,
+            succession,
+            requests,
+            lost: BTreeSet::new(),
+            stands_by: false,
+            attended: None,
+            _awake: Awake::keep(prepared)?,
+        })
     }
 
     /// Watches the run to its end, and sees to what it leaves.
@@ -175,6 +221,7 @@ impl Supervisor {
         let (mut clock, mut standstill) = (Stopwatch::start(), Standstill::default());
         let mut observation = Observation::for_team(prepared.run.robots.len());
         let (mut is_started, mut has_begun) = (false, false);
+        let mut meals = Meals::default();
         loop {
             if is_started && !has_begun {
                 if let Some(tick) = self.tap.first_tick() {
@@ -203,17 +250,27 @@ impl Supervisor {
                     Err(TickError::SharedMemoryFull) => {
                         return Watched::Unobservable(Failure::fault(TickError::SharedMemoryFull));
                     }
+                    Err(error) if self.attended.is_some() => {
+                        return Watched::Unobservable(Failure::fault(error));
+                    }
                     Err(_) => return Watched::Lost,
                 }
             }
             if let Some(signal) = interrupts.received() {
                 return Watched::Signal(signal);
             }
-            if !self.look_after(prepared, observer) || self.is_given_up(prepared) {
+            if self.attended.is_some() {
+                self.look_on(prepared, observer);
+                meals.serve(|| format!("{} ticks seen", observer.ticks()));
+            } else if !self.look_after(prepared, observer) || self.is_given_up(prepared) {
                 return Watched::Lost;
             }
             if is_paced(prepared) && self.nobody_speaks() {
                 self.team_tap.give_up_waiting();
+            }
+            if self.attended.is_some() {
+                pause(LOOK);
+                continue;
             }
             let is_set_up = self.all_services_are(State::Ready);
             let lasted = standstill.look(self.progress(), clock.lap());
@@ -246,7 +303,7 @@ impl Supervisor {
     /// Ends what still runs, and says what came of it.
     fn conclude(mut self, run: &RunSpec, watched: Watched) -> Outcome {
         let before: Vec<_> = self.member.board().statuses();
-        if !matches!(watched, Watched::All) {
+        if !matches!(watched, Watched::All) && self.attended.is_none() {
             self.member.board().request_stop();
         }
         self.tap.detach();
@@ -336,7 +393,8 @@ fn services_of(prepared: &Prepared) -> impl Iterator<Item = (ServiceId, String, 
 /// Which program a service is.
 fn variant_of(prepared: &Prepared, service: ServiceId) -> Result<Variant, Failure> {
     if !prepared.is_empty {
-        return Ok(Variant::default());
+        let program = prepared.bridge.clone().filter(|_| service == ServiceId::Bridge);
+        return Ok(Variant { program, ..Variant::default() });
     }
     let arguments = match service {
         ServiceId::Servo(_) => vec![],

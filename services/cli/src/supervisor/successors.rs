@@ -16,6 +16,22 @@ use mikoshi_runtime::{Clock, Position, State};
 const PATIENCE: Duration = Duration::from_millis(40);
 
 impl Supervisor {
+    /// Hears what is asked for, and takes note of successors that somebody else has started.
+    pub(super) fn look_on(&mut self, prepared: &Prepared, observer: &mut RunObserver) {
+        let (run, board) = (&prepared.run, self.member.board());
+        self.requests.look(run, board, &mut self.children, observer);
+        let Some(known) = &mut self.attended else { return };
+        for service in prepared.schedule.services() {
+            let Some((epoch, since)) = board.charge_of(service).filter(|(epoch, _)| *epoch > 0) else {
+                continue;
+            };
+            let before = known.insert(service, epoch);
+            if before.is_some_and(|before| before < epoch) {
+                observer.note_swap(service, swap_of(run, service, since.tick + 1, "taken over".to_owned()));
+            }
+        }
+    }
+
     /// Sees to successors of processes that were killed; `false` if somebody is lost for good.
     pub(super) fn look_after(&mut self, prepared: &Prepared, observer: &mut RunObserver) -> bool {
         let run = &prepared.run;

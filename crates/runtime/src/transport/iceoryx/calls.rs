@@ -122,6 +122,9 @@ impl Process {
             && let Some(slot) = self.slot_at(source)
         {
             slot.lobby(source.phase).call();
+            if let Some(link) = self.link.and_then(|link| self.member.board().slots().get(link)) {
+                link.bed.call();
+            }
         }
     }
 }

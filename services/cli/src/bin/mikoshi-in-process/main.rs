@@ -17,9 +17,10 @@ use mikoshi_config::RunSpec;
 use mikoshi_coordinator::CoordinatorParticipant;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_observation::{Observation, TeamTap};
+use mikoshi_physics::{BridgeParticipant, BuildBridgeError};
 use mikoshi_runtime::{Clock, InMemoryHub, InMemoryTransport, Replaceable, run_in_one_thread};
 use mikoshi_servo::ServoParticipant;
-use mikoshi_sim_bridge::{BridgeParticipant, BuildBridgeError, world_xml};
+use mikoshi_sim_bridge::{World, world_xml};
 use mujoco_rs::mujoco_version;
 use std::fs;
 use std::process::ExitCode;
@@ -95,11 +96,11 @@ fn participant(
     transport: &InMemoryTransport,
 ) -> Result<Box<dyn Replaceable>, Failure> {
     Ok(match service {
-        ServiceId::Bridge => {
-            Box::new(BridgeParticipant::new(run, transport).map_err(|error: BuildBridgeError| {
+        ServiceId::Bridge => Box::new(BridgeParticipant::<_, World>::new(run, transport).map_err(
+            |error: BuildBridgeError| {
                 if error.is_fault() { Failure::fault(error) } else { Failure::usage(error) }
-            })?)
-        }
+            },
+        )?),
         ServiceId::Coordinator => {
             Box::new(CoordinatorParticipant::new(run, transport).map_err(Failure::usage)?)
         }

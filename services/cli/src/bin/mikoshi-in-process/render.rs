@@ -3,7 +3,7 @@
 use mikoshi::arguments::{CameraChoice, RenderArguments};
 use mikoshi::failure::{Failure, as_lines};
 use mikoshi::output_directory::refuse_to_overwrite;
-use mikoshi::print::{print_error, print_out};
+use mikoshi::print::{print_error, print_file};
 use mikoshi_observation::LogReader;
 use mikoshi_picture::{PictureError, Size, View, course, draw, film};
 use std::fs;
@@ -50,8 +50,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
         let warning = format!("{}: cut or damaged, drawn up to there: {damage}", arguments.log.display());
         print_error(&as_lines("warning", &warning));
     }
-    print_out(&format!("{}\n", out.display()));
-    Ok(())
+    print_file(out, arguments.json)
 }
 
 fn draw_film(

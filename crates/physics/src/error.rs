@@ -43,8 +43,13 @@ pub enum BuildWorldError {
         what: String,
     },
     /// The simulator's own objection.
-    #[error("MuJoCo rejects the world: {0}")]
-    Simulator(String),
+    #[error("{engine} rejects the world: {what}")]
+    Simulator {
+        /// The simulator.
+        engine: &'static str,
+        /// Its words.
+        what: String,
+    },
 }
 
 /// A step that could not be made, or whose result is not physics.

@@ -2,20 +2,21 @@
 
 use crate::coast::{Coast, Rates};
 use crate::fallback::{Fallback, FallbackState};
-use crate::{BuildWorldError, World};
+use crate::{BuildWorldError, Physics};
 use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{
-    Frame, JointCommand, MAX_JOINTS, MAX_ROBOTS, ObjectTruth, Payload, RobotTruth, Sensors, ServiceId,
+    Frame, JointCommand, MAX_JOINTS, MAX_ROBOTS, ObjectTruth, OperatorInput, Payload, Push, RobotTruth,
+    Sensors, ServiceId,
 };
 use mikoshi_runtime::{
-    Call, ConnectError, Loan, Participant, Publisher, Replaceable, Subscriber, TickError, Transport,
-    has_arrived, read_parts, state_schema, write_parts,
+    Call, ConnectError, Loan, OperatorPort, Participant, Publisher, Replaceable, Subscriber, TickError,
+    Transport, has_arrived, read_parts, state_schema, write_parts,
 };
 use thiserror::Error;
 
 /// Of the layout of a world's checkpoint: another one gets another number.
-const STATE_VERSION: u64 = 4;
+const STATE_VERSION: u64 = 5;
 
 /// Why a bridge could not be made.
 #[derive(Debug, Error)]
@@ -30,13 +31,13 @@ pub enum BuildBridgeError {
 impl BuildBridgeError {
     /// Whether the system is to blame, and not the run that was asked for.
     pub fn is_fault(&self) -> bool {
-        matches!(self, Self::Connect(_) | Self::World(BuildWorldError::Simulator(_)))
+        matches!(self, Self::Connect(_) | Self::World(BuildWorldError::Simulator { .. }))
     }
 }
 
-/// The simulated world with its ports.
-pub struct BridgeParticipant<T: Transport> {
-    world: World,
+/// A world with its ports.
+pub struct BridgeParticipant<T: Transport, W: Physics> {
+    world: W,
     frame: Frame<JointCommand>,
     commands: Vec<JointCommand>,
     /// One past the tick of the last command of each robot that has arrived; 0 before the first.
@@ -48,6 +49,9 @@ pub struct BridgeParticipant<T: Transport> {
     fallback_states: Vec<FallbackState>,
     robots: Vec<RobotPorts<T>>,
     object_truth: T::Publisher<ObjectTruth>,
+    operator: OperatorPort,
+    /// The last push that was heard of.
+    heard_push: Push,
 }
 
 struct RobotPorts<T: Transport> {
@@ -56,7 +60,7 @@ struct RobotPorts<T: Transport> {
     command: T::Subscriber<JointCommand>,
 }
 
-impl<T: Transport> BridgeParticipant<T> {
+impl<T: Transport, W: Physics> BridgeParticipant<T, W> {
     /// Builds the run's world and connects it.
     ///
     /// # Errors
@@ -71,7 +75,7 @@ impl<T: Transport> BridgeParticipant<T> {
         };
         let robots = (0..run.robots.len()).map(ports).collect::<Result<Vec<_>, ConnectError>>()?;
         let frame = Frame::zeroed();
-        let (world, period_s) = (World::new(run)?, run.scenario.control_period_s);
+        let (world, period_s) = (W::new(run)?, run.scenario.control_period_s);
         let fallbacks = world.joint_limits().map(|limits| Fallback::new(period_s, limits)).collect();
         Ok(Self {
             world,
@@ -84,11 +88,13 @@ impl<T: Transport> BridgeParticipant<T> {
             frame,
             robots,
             object_truth: transport.publisher(0)?,
+            operator: transport.operator(),
+            heard_push: Push::default(),
         })
     }
 
     /// The world.
-    pub fn world(&self) -> &World {
+    pub fn world(&self) -> &W {
         &self.world
     }
 
@@ -106,8 +112,22 @@ impl<T: Transport> BridgeParticipant<T> {
             loan.send()?;
         }
         let mut loan = self.object_truth.loan(tick)?;
-        self.world.object_truth(loan.payload_mut());
+        let truth = loan.payload_mut();
+        self.world.object_truth(truth);
+        let Push { number, target, force_n, ticks } = self.heard_push;
+        (truth.heard_push_number, truth.heard_push_target) = (number, target);
+        (truth.heard_push_force_n, truth.heard_push_ticks) = (force_n, ticks);
         loan.send()
+    }
+
+    /// Pushes whom somebody wants pushed. What was heard is kept with this step, and said with the next tick.
+    fn hear_pushes(&mut self) {
+        let last = OperatorInput { push: self.heard_push, ..OperatorInput::default() };
+        let push = self.operator.hear(&last).push;
+        if push.number != 0 && push.number != self.heard_push.number {
+            self.heard_push = push;
+            self.world.push(&push);
+        }
     }
 
     fn step(&mut self, tick: u64) -> Result<(), TickError> {
@@ -140,6 +160,7 @@ impl<T: Transport> BridgeParticipant<T> {
             *rates_before = last.joint_velocity_ref_rad_s;
         }
         self.world.note_rejected(rejected);
+        self.hear_pushes();
         self.world.step(&self.commands).map_err(|error| TickError::Service(error.text()))
     }
 }
@@ -156,7 +177,7 @@ fn is_credible(command: &JointCommand, last: &JointCommand) -> bool {
         && command.joint_velocity_ref_rad_s.iter().all(|rate| rate.abs() <= ABSURD_RATE_RAD_S)
 }
 
-impl<T: Transport> Participant for BridgeParticipant<T> {
+impl<T: Transport, W: Physics> Participant for BridgeParticipant<T, W> {
     fn id(&self) -> ServiceId {
         ServiceId::Bridge
     }
@@ -181,7 +202,7 @@ impl<T: Transport> Participant for BridgeParticipant<T> {
     }
 }
 
-impl<T: Transport> Replaceable for BridgeParticipant<T> {
+impl<T: Transport, W: Physics> Replaceable for BridgeParticipant<T, W> {
     fn state_schema(&self) -> u64 {
         let parts = [
             Sensors::SCHEMA_HASH,
@@ -198,6 +219,7 @@ impl<T: Transport> Replaceable for BridgeParticipant<T> {
         size_of_val(&self.next_command_tick)
             + size_of_val(&self.rates_before)
             + size_of_val(self.fallback_states.as_slice())
+            + size_of_val(&self.heard_push)
             + self.world.checkpoint_size()
     }
 
@@ -217,13 +239,14 @@ impl<T: Transport> Replaceable for BridgeParticipant<T> {
     }
 }
 
-impl<T: Transport> BridgeParticipant<T> {
+impl<T: Transport, W: Physics> BridgeParticipant<T, W> {
     /// What a checkpoint holds beside the world.
-    fn parts(&mut self) -> [&mut [u8]; 3] {
+    fn parts(&mut self) -> [&mut [u8]; 4] {
         [
             bytemuck::cast_slice_mut(&mut self.next_command_tick),
             bytemuck::cast_slice_mut(&mut self.rates_before),
             bytemuck::cast_slice_mut(&mut self.fallback_states),
+            bytemuck::bytes_of_mut(&mut self.heard_push),
         ]
     }
 }

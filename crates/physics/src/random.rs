@@ -11,6 +11,8 @@ pub enum Purpose {
     GraspOffset,
     /// What a robot's sensors add to the truth.
     SensorNoise,
+    /// What lies on the floor.
+    Ground,
 }
 
 /// Numbers by place.

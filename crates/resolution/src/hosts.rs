@@ -1,0 +1,55 @@
+//! What goes from host to host, and who has a place on which.
+
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::{Output, TickSchedule};
+use std::collections::BTreeSet;
+
+/// A frame that goes from one host to another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crossing {
+    /// What.
+    pub output: Output,
+    /// Whose.
+    pub from: ServiceId,
+    /// The host on which that lives.
+    pub from_host: usize,
+    /// The host to which it goes.
+    pub to_host: usize,
+    /// Whether a service there waits for it, and not only an observer.
+    pub is_awaited: bool,
+}
+
+/// All that goes from host to host in a tick: what services elsewhere wait for; and to the host of the bridge, where a
+/// run is recorded, everything. What is true of the world stays there.
+pub fn crossings(run: &RunSpec, schedule: &TickSchedule) -> Vec<Crossing> {
+    let scenario = &run.scenario;
+    let recording = scenario.host_of(ServiceId::Bridge);
+    let of_output = |(from, output): (ServiceId, &Output)| {
+        let from_host = scenario.host_of(from);
+        let consumers =
+            schedule.consumers_of(output.topic).filter_map(|(consumer, _)| scenario.host_of(consumer));
+        let consumers: BTreeSet<usize> = consumers.collect();
+        let hosts: BTreeSet<usize> = consumers.iter().copied().chain(recording).collect();
+        let crossing = |to_host: usize| {
+            let from_host = from_host.filter(|host| *host != to_host)?;
+            let is_awaited = consumers.contains(&to_host);
+            Some(Crossing { output: *output, from, from_host, to_host, is_awaited })
+        };
+        hosts.into_iter().filter_map(crossing).collect::<Vec<_>>()
+    };
+    schedule.outputs().flat_map(of_output).collect()
+}
+
+/// The services that have a place on the board of this host: those that live there, those whose words come there, and
+/// the bridge, by whose tick all go. In the order of the schedule.
+pub fn services_on_board(run: &RunSpec, schedule: &TickSchedule, host: usize) -> Vec<ServiceId> {
+    let crossings = crossings(run, schedule);
+    let comes = |service: &ServiceId| {
+        crossings.iter().any(|crossing| crossing.from == *service && crossing.to_host == host)
+    };
+    let has_place = |service: &ServiceId| {
+        *service == ServiceId::Bridge || run.scenario.host_of(*service) == Some(host) || comes(service)
+    };
+    schedule.services().into_iter().filter(has_place).collect()
+}

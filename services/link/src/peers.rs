@@ -1,0 +1,372 @@
+//! What hosts say of themselves, and what is known of the others: whose link is which, how far their services are, how
+//! long the way there is, and what their clocks show. The latter two are for people: control goes by ticks alone.
+
+use crate::gate::{Counters, Refusal};
+use crate::message::{Header, Heard, Hello, MAX_PLACES, Progress};
+use bytemuck::{Zeroable, bytes_of};
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::time::Duration;
+use mikoshi_config::RunSpec;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::{Board, Role, State, now_ns};
+use serde::Serialize;
+use std::sync::{Mutex, PoisonError};
+
+/// Exchanges of which the shortest tells what the clock shows: it waited least.
+const EXCHANGES: usize = 64;
+
+/// The others, as they are known at the moment. Shared by the threads of a link.
+pub struct Peers {
+    own: usize,
+    run: [u8; 32],
+    incarnation: u64,
+    /// In canonical order, with the host of each.
+    services: Vec<(ServiceId, usize)>,
+    peers: Vec<Peer>,
+    /// One past the tick that the clock is in; 0 before the first.
+    next_tick: AtomicU64,
+    /// How often others were heard to say "stop".
+    stops: AtomicU64,
+}
+
+/// One other host.
+struct Peer {
+    name: String,
+    counters: Counters,
+    incarnation: AtomicU64,
+    /// Whether it carries out the same run.
+    is_foreign: AtomicU64,
+    known: Mutex<Known>,
+}
+
+#[derive(Default)]
+struct Known {
+    services: Vec<Progress>,
+    stops: u64,
+    heard: Heard,
+    /// When anything was heard of it, by our clock.
+    exchanges: Vec<Exchange>,
+    next: usize,
+}
+
+/// One way there and back.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Exchange {
+    round_trip_ns: u64,
+    /// What its clock is ahead of ours.
+    offset_ns: i64,
+}
+
+impl Exchange {
+    /// Of a message that was sent at `sent`, came there at `came`; the answer left at `left` and came here at `now`.
+    fn of(sent: u64, came: u64, left: u64, now: u64) -> Option<Self> {
+        let there_ns = left.checked_sub(came)?;
+        let round_trip_ns = now.checked_sub(sent)?.checked_sub(there_ns)?;
+        let (out, back) = (came as i128 - sent as i128, left as i128 - now as i128);
+        Some(Self { round_trip_ns, offset_ns: ((out + back) / 2).try_into().ok()? })
+    }
+}
+
+/// What is shown of another host.
+#[derive(Debug, Serialize)]
+pub struct PeerReport<'a> {
+    host: &'a str,
+    heard_s_ago: Option<f64>,
+    is_of_another_run: bool,
+    round_trip_s: Option<f64>,
+    clock_ahead_s: Option<f64>,
+    hello: &'a Counters,
+}
+
+impl Peers {
+    /// Of host `own` of this run, whose link has this number.
+    pub fn new(run: &RunSpec, hash: [u8; 32], own: usize, incarnation: u64) -> Self {
+        let host_of = |service| Some((service, run.scenario.host_of(service)?));
+        let peer = |name: &str| Peer {
+            name: name.to_owned(),
+            counters: Counters::default(),
+            incarnation: AtomicU64::new(0),
+            is_foreign: AtomicU64::new(0),
+            known: Mutex::default(),
+        };
+        Self {
+            own,
+            run: hash,
+            incarnation,
+            services: ServiceId::of_team(run.robots.len()).filter_map(host_of).collect(),
+            peers: run.scenario.hosts.iter().map(|host| peer(&host.name)).collect(),
+            next_tick: AtomicU64::new(0),
+            stops: AtomicU64::new(0),
+        }
+    }
+
+    /// The beginning of the run's hash.
+    pub fn run(&self) -> u64 {
+        u64::from_le_bytes(*self.run.first_chunk().unwrap_or(&[0; 8]))
+    }
+
+    /// The number of our link.
+    pub fn incarnation(&self) -> u64 {
+        self.incarnation
+    }
+
+    /// A header of ours.
+    pub fn header(&self) -> Header {
+        Header::new(self.run(), self.incarnation, now_ns())
+    }
+
+    /// What we say of ourselves.
+    pub fn hello(&self, board: &Board) -> Vec<u8> {
+        let mut hello = Hello { run: self.run, stops: board.stops(), ..Hello::zeroed() };
+        for (place, (service, host)) in hello.services.iter_mut().zip(&self.services) {
+            if *host == self.own {
+                let state = board
+                    .states()
+                    .find_map(|(role, state)| (role == Role::Service(*service)).then_some(state));
+                place.state = state.unwrap_or(State::Absent) as u64;
+                place.tick = board.last_position(*service).unwrap_or_default().tick;
+            }
+        }
+        for (heard, peer) in hello.heard.iter_mut().zip(&self.peers) {
+            *heard = peer.known().heard;
+        }
+        self.header().with(&[bytes_of(&hello)])
+    }
+
+    /// Hears what another host says of itself; whether it says anything new.
+    pub fn hear(&self, host: usize, message: &[u8]) -> bool {
+        let peer = &self.peers[host];
+        let heard = self.try_hear(peer, message);
+        peer.counters.count(&heard);
+        heard.unwrap_or(false)
+    }
+
+    fn try_hear(&self, peer: &Peer, message: &[u8]) -> Result<bool, Refusal> {
+        let came_ns = now_ns();
+        let (header, body) = Header::split(message).ok_or(Refusal::Malformed)?;
+        let hello: Hello = bytemuck::try_pod_read_unaligned(body).map_err(|_| Refusal::Malformed)?;
+        if hello.run != self.run || header.run != self.run() {
+            peer.is_foreign.store(1, Ordering::Relaxed);
+            return Err(Refusal::Run);
+        }
+        // A link that was started anew has a larger number than its predecessor.
+        let last = peer.incarnation.fetch_max(header.incarnation, Ordering::AcqRel);
+        if header.incarnation < last {
+            return Err(Refusal::Incarnation);
+        }
+        peer.is_foreign.store(0, Ordering::Relaxed);
+        let mut known = peer.known();
+        let is_new_link = header.incarnation > last;
+        if !is_new_link && header.sent_ns <= known.heard.sent_ns {
+            return Err(Refusal::Overtaken);
+        }
+        if is_new_link {
+            known.exchanges.clear();
+            known.next = 0;
+        }
+        known.heard = Heard { sent_ns: header.sent_ns, came_ns };
+        let ours = hello.heard.get(self.own).copied().unwrap_or_default();
+        if let Some(exchange) =
+            Exchange::of(ours.sent_ns, ours.came_ns, header.sent_ns, came_ns).filter(|_| ours.sent_ns > 0)
+        {
+            let next = known.next % EXCHANGES;
+            match known.exchanges.get_mut(next) {
+                Some(place) => *place = exchange,
+                None => known.exchanges.push(exchange),
+            }
+            known.next += 1;
+        }
+        let is_new =
+            known.services.iter().map(|service| service.state).ne(hello.services.iter().map(|s| s.state));
+        known.services = hello.services.to_vec();
+        // Of a link that was started anew it is not known how often it was said before.
+        let is_to_stop = !is_new_link && hello.stops != known.stops;
+        known.stops = hello.stops;
+        if is_to_stop {
+            self.stops.fetch_add(1, Ordering::AcqRel);
+        }
+        Ok(is_new || is_new_link || is_to_stop)
+    }
+
+    /// Which link speaks for a host; 0 if none has introduced itself.
+    pub fn incarnation_of(&self, host: usize) -> u64 {
+        self.peers[host].incarnation.load(Ordering::Acquire)
+    }
+
+    /// How far a service elsewhere says it is, if its host has been heard.
+    pub fn state_of(&self, service: ServiceId) -> Option<State> {
+        let index = self.services.iter().position(|(other, _)| *other == service)?;
+        let peer = &self.peers[self.services[index].1];
+        let code = peer.known().services.get(index)?.state;
+        let states =
+            [State::Absent, State::Retired, State::Starting, State::Wired, State::Ready, State::Running];
+        let states = states.into_iter().chain([State::Done, State::Failed]);
+        states.into_iter().find(|state| *state as u64 == code)
+    }
+
+    /// For how long nothing has been heard of this host, if it ever was.
+    pub fn silence_of(&self, host: usize) -> Option<Duration> {
+        let came_ns = self.peers[host].known().heard.came_ns;
+        (came_ns > 0).then(|| Duration::from_nanos(now_ns().saturating_sub(came_ns)))
+    }
+
+    /// What a host's clock is ahead of ours, by the exchange that waited least.
+    pub fn offset_ns(&self, host: usize) -> Option<i64> {
+        self.peers[host].known().shortest().map(|exchange| exchange.offset_ns)
+    }
+
+    /// The tick that the clock is in, once it has begun.
+    pub fn tick(&self) -> Option<u64> {
+        self.next_tick.load(Ordering::Acquire).checked_sub(1)
+    }
+
+    /// How often others were heard to say "stop".
+    pub fn stops(&self) -> u64 {
+        self.stops.load(Ordering::Acquire)
+    }
+
+    /// It has reached this tick; whether that is new.
+    pub fn reach(&self, tick: u64) -> bool {
+        let next_tick = tick.saturating_add(1);
+        self.next_tick.fetch_max(next_tick, Ordering::AcqRel) < next_tick
+    }
+
+    /// What is shown of the others.
+    pub fn report(&self) -> Vec<PeerReport<'_>> {
+        let others = self.peers.iter().enumerate().filter(|(host, _)| *host != self.own);
+        let report = |(_, peer): (usize, &'_ Peer)| {
+            let known = peer.known();
+            let shortest = known.shortest();
+            let seconds = |ns: u64| ns as f64 / 1e9;
+            (
+                (known.heard.came_ns > 0).then(|| seconds(now_ns().saturating_sub(known.heard.came_ns))),
+                shortest.map(|exchange| seconds(exchange.round_trip_ns)),
+                shortest.map(|exchange| exchange.offset_ns as f64 / 1e9),
+            )
+        };
+        others
+            .map(|(host, peer)| {
+                let (heard_s_ago, round_trip_s, clock_ahead_s) = report((host, peer));
+                PeerReport {
+                    host: &peer.name,
+                    heard_s_ago,
+                    is_of_another_run: peer.is_foreign.load(Ordering::Relaxed) != 0,
+                    round_trip_s,
+                    clock_ahead_s,
+                    hello: &peer.counters,
+                }
+            })
+            .collect()
+    }
+}
+
+impl Peer {
+    fn known(&self) -> std::sync::MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Known {
+    fn shortest(&self) -> Option<Exchange> {
+        self.exchanges.iter().copied().min_by_key(|exchange| exchange.round_trip_ns)
+    }
+}
+
+const _: () = assert!(MAX_PLACES >= 3);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mikoshi_config::load_scenario;
+    use mikoshi_resolution::resolve;
+    use std::path::Path;
+
+    #[test]
+    fn an_exchange_tells_the_way_and_the_clock() {
+        // Its clock is ahead by 1000; 10 there, 5 in between, 20 back.
+        let exchange = Exchange::of(100, 1110, 1115, 135).expect("it is one");
+        assert_eq!(exchange, Exchange { round_trip_ns: 30, offset_ns: 995 });
+        // Behind by more than we have counted.
+        let exchange = Exchange::of(5000, 10, 20, 5020).expect("it is one");
+        assert_eq!(exchange, Exchange { round_trip_ns: 10, offset_ns: -4995 });
+    }
+
+    #[test]
+    fn what_can_not_have_been_is_no_exchange() {
+        for (sent, came, left, now) in
+            [(100, 20, 10, 200), (200, 1, 2, 100), (100, 0, 1000, 200), (0, u64::MAX, u64::MAX, u64::MAX)]
+        {
+            let found = Exchange::of(sent, came, left, now);
+            assert!(found.is_none() || sent == 0, "{found:?}");
+        }
+    }
+
+    const HASH: [u8; 32] = [7; 32];
+
+    fn run() -> RunSpec {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/hold.toml");
+        let host = |name: &str, services: &str| {
+            format!("{{ name = \"{name}\", services = [{services}], listen = \"{name}:7447\" }}")
+        };
+        let hosts = [host("stage", r#""bridge", "coordinator""#), host("robots", r#""A", "B""#)].join(", ");
+        let set = [("team", "two".to_owned()), ("hosts", format!("[{hosts}]"))];
+        let set = set.map(|(key, value)| (key.to_owned(), value));
+        resolve(&load_scenario(&file, &set, None).expect("it is right")).expect("it can be run")
+    }
+
+    fn board(folder: &Path) -> Board {
+        Board::create_for_host(folder, &ServiceId::of_team(2).collect::<Vec<_>>()).expect("a board")
+    }
+
+    #[test]
+    fn who_introduces_himself_is_known_and_his_successor_after_him() {
+        let (run, folder) = (run(), tempfile::tempdir().expect("a folder"));
+        let board = board(folder.path());
+        let stage = Peers::new(&run, HASH, 0, 5);
+        assert_eq!((stage.incarnation_of(1), stage.silence_of(1)), (0, None));
+        let robots = |incarnation| Peers::new(&run, HASH, 1, incarnation);
+        assert!(stage.hear(1, &robots(20).hello(&board)));
+        assert_eq!((stage.incarnation_of(1), stage.state_of(ServiceId::Servo(0))), (20, Some(State::Absent)));
+        assert!(!stage.hear(1, &robots(20).hello(&board)), "nothing new");
+        assert!(!stage.hear(1, &robots(19).hello(&board)), "it has a successor");
+        assert!(stage.hear(1, &robots(21).hello(&board)));
+        assert_eq!(stage.incarnation_of(1), 21);
+        let refused: Vec<_> = stage.peers[1].counters.refused().collect();
+        assert_eq!(refused, [("incarnation", 1)]);
+    }
+
+    #[test]
+    fn another_run_bytes_and_what_was_said_before_are_refused() {
+        let (run, folder) = (run(), tempfile::tempdir().expect("a folder"));
+        let board = board(folder.path());
+        let stage = Peers::new(&run, HASH, 0, 5);
+        assert!(!stage.hear(1, &Peers::new(&run, [8; 32], 1, 20).hello(&board)));
+        assert!(stage.report()[0].is_of_another_run && stage.incarnation_of(1) == 0);
+        let robots = Peers::new(&run, HASH, 1, 20);
+        let (first, second) = (robots.hello(&board), robots.hello(&board));
+        assert!(stage.hear(1, &second));
+        assert!(!stage.report()[0].is_of_another_run);
+        for message in [&first[..], &second, &[], &second[1..], &[&second[..], &[0]].concat()] {
+            assert!(!stage.hear(1, message));
+        }
+        let refused: Vec<_> = stage.peers[1].counters.refused().collect();
+        assert_eq!(refused, [("malformed", 3), ("run", 1), ("overtaken", 2)]);
+    }
+
+    #[test]
+    fn a_stop_is_heard_once_wherever_it_is_said() {
+        let (run, folder) = (run(), tempfile::tempdir().expect("a folder"));
+        let board = board(folder.path());
+        let (stage, robots) = (Peers::new(&run, HASH, 0, 5), Peers::new(&run, HASH, 1, 20));
+        board.say(mikoshi_ipc_types::operator::STOP);
+        stage.hear(1, &robots.hello(&board));
+        assert_eq!(stage.stops(), 0, "that was before it was known");
+        board.say(mikoshi_ipc_types::operator::RESUME);
+        stage.hear(1, &robots.hello(&board));
+        assert_eq!(stage.stops(), 0, "whoever holds a robot's key lets no team go on");
+        board.say(mikoshi_ipc_types::operator::STOP);
+        assert!(stage.hear(1, &robots.hello(&board)));
+        assert!(!stage.hear(1, &robots.hello(&board)));
+        assert_eq!(stage.stops(), 1);
+    }
+}

@@ -1,0 +1,205 @@
+//! Says hello to the others, and writes down what is counted, beside the frames.
+
+use crate::keys::Keys;
+use crate::latency::{Quantiles, fitting_delay_ticks};
+use crate::peers::{PeerReport, Peers};
+use crate::session::SessionError;
+use crate::traffic::Source;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use mikoshi_config::RunSpec;
+use mikoshi_runtime::Board;
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError};
+use std::thread::{self, JoinHandle};
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::sample::Locality;
+use zenoh::{Session, Wait as _};
+
+/// How often others hear of us.
+const HELLO: Duration = Duration::from_millis(50);
+/// How many hellos lie between two reports.
+const HELLOS_A_REPORT: u32 = 20;
+/// The report, in the run's directory.
+const REPORT: &str = "link.json";
+
+/// A thread beside the carrier.
+pub struct Reporter {
+    state: Arc<Reported>,
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Reported {
+    host: String,
+    names: Vec<String>,
+    period_s: f64,
+    peers: Arc<Peers>,
+    sources: Vec<Arc<Source>>,
+    path: PathBuf,
+    session: Session,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    host: &'a str,
+    incarnation: u64,
+    tick: Option<u64>,
+    hosts: Vec<PeerReport<'a>>,
+    /// What hosts have put under keys that are not theirs.
+    refused_by_access_control: Option<u64>,
+    topics: Vec<TopicReport<'a>>,
+    /// Of the coordinator's commands to robots of this host.
+    fitting_delay_ticks: Option<u64>,
+}
+
+#[derive(Serialize)]
+struct TopicReport<'a> {
+    topic: String,
+    from: &'a str,
+    frames: &'a crate::gate::Counters,
+    one_way: Option<Quantiles>,
+    round_trip: Option<Quantiles>,
+}
+
+impl Reported {
+    fn report(&self) -> Report<'_> {
+        let quantiles = |latencies: &std::sync::Mutex<crate::latency::Latencies>| {
+            latencies.lock().unwrap_or_else(PoisonError::into_inner).quantiles()
+        };
+        let topics: Vec<_> = self
+            .sources
+            .iter()
+            .map(|source| TopicReport {
+                topic: source.topic.to_string(),
+                from: &self.names[source.host],
+                frames: &source.counters,
+                one_way: quantiles(&source.latencies),
+                round_trip: quantiles(&source.round_trips),
+            })
+            .collect();
+        let round_trips = topics.iter().filter_map(|topic| topic.round_trip);
+        let fitting_delay_ticks = round_trips.map(|found| fitting_delay_ticks(&found, self.period_s)).max();
+        Report {
+            host: &self.host,
+            incarnation: self.peers.incarnation(),
+            tick: self.peers.tick(),
+            hosts: self.peers.report(),
+            refused_by_access_control: refused_by_access_control(&self.session),
+            topics,
+            fitting_delay_ticks,
+        }
+    }
+
+    /// What can't be written is not worth a run.
+    fn write(&self) {
+        let text = serde_json::to_string_pretty(&self.report()).unwrap_or_default();
+        let unfinished = self.path.with_extension("unfinished");
+        let _ = fs::write(&unfinished, text).and_then(|()| fs::rename(&unfinished, &self.path));
+    }
+}
+
+/// What Zenoh itself has refused, if it says so.
+fn refused_by_access_control(session: &Session) -> Option<u64> {
+    let selector = format!(
+        "@/{}/peer/metrics?per_link=false;per_key=false;disconnected=true;descriptors=false;compression=false",
+        session.zid()
+    );
+    let replies = session.get(selector).timeout(HELLO).wait().ok()?;
+    let reply = replies.recv().ok()?;
+    let text = reply.result().ok()?.payload().to_bytes().into_owned();
+    let text = String::from_utf8(text).ok()?;
+    let is_meant = |line: &&str| {
+        line.contains("rx_network_message_dropped_payload_bytes_count") && line.contains("access-control")
+    };
+    let counts =
+        text.lines().filter(is_meant).filter_map(|line| line.rsplit(' ').next()?.parse::<f64>().ok());
+    Some(counts.sum::<f64>() as u64)
+}
+
+impl Reporter {
+    /// Starts it.
+    ///
+    /// # Errors
+    /// There is no board, or no key to speak under.
+    pub fn start(
+        directory: &Path,
+        run: &RunSpec,
+        host: usize,
+        session: &Session,
+        keys: &Keys,
+        peers: Arc<Peers>,
+        sources: &[Arc<Source>],
+    ) -> Result<Self, SessionError> {
+        let names: Vec<_> = run.scenario.hosts.iter().map(|host| host.name.clone()).collect();
+        let key = keys.hello(&names[host]);
+        let publisher = session
+            .declare_publisher(key.clone())
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .allowed_destination(Locality::Remote)
+            .wait()
+            .map_err(|error| SessionError::of(key, error))?;
+        let board = Board::open(directory).map_err(|error| SessionError::of("board", error))?;
+        let state = Arc::new(Reported {
+            host: names[host].clone(),
+            names,
+            period_s: run.scenario.wall_period_s(),
+            peers,
+            sources: sources.to_vec(),
+            path: directory.join(REPORT),
+            session: session.clone(),
+        });
+        let is_over = Arc::new(AtomicBool::new(false));
+        let (reported, over) = (Arc::clone(&state), Arc::clone(&is_over));
+        let thread = thread::spawn(move || {
+            for number in 0_u32.. {
+                let _ = publisher.put(reported.peers.hello(&board)).wait();
+                if number % HELLOS_A_REPORT == 0 {
+                    reported.write();
+                }
+                if over.load(Ordering::Acquire) {
+                    break;
+                }
+                pause(HELLO);
+            }
+        });
+        Ok(Self { state, is_over, thread: Some(thread) })
+    }
+
+    /// Lets it go on for so long, and ends it.
+    pub fn end_after(&self, farewell: Duration) {
+        pause(farewell);
+        self.is_over.store(true, Ordering::Release);
+        self.state.write();
+    }
+
+    /// What was refused, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let of_source = |source: &Arc<Source>| {
+            let refused: Vec<_> =
+                source.counters.refused().map(|(name, count)| format!("{count} {name}")).collect();
+            let (topic, host) = (source.topic, &self.state.names[source.host]);
+            (!refused.is_empty()).then(|| format!("{topic} of {host}: {}", refused.join(", ")))
+        };
+        self.state.sources.iter().filter_map(of_source).collect()
+    }
+}
+
+impl Drop for Reporter {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // One that panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "beside the frames, of which none waits for it")]
+fn pause(time: Duration) {
+    thread::sleep(time);
+}

@@ -1,0 +1,48 @@
+//! Teams that walk and carry, and whom somebody pushes, or whose floor is not what they think.
+
+use mikoshi_tests::run::{Results, run};
+use mikoshi_tests::scenarios::of_project;
+use serde_json::Value;
+
+/// The summary of a run of a project's scenario that met its thresholds.
+fn passed(scenario: &str, arguments: &[&str]) -> Value {
+    let results = Results::new();
+    let arguments = [&["--in-process", "--no-log"], arguments].concat();
+    let said = run(&of_project(scenario), &arguments, &results);
+    assert_eq!(said.status, Some(0), "{said:#?}");
+    results.summary()
+}
+
+fn least_margin_m(summary: &Value) -> f64 {
+    let robots = summary["robots"].as_array().expect("robots");
+    robots
+        .iter()
+        .map(|robot| robot["zmp_margin_min_m"].as_f64().expect("a margin"))
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn one_of_four_that_is_pushed_by_100_n_keeps_10_mm() {
+    let summary = passed("pushed.toml", &[]);
+    assert!(least_margin_m(&summary) >= 0.010, "{summary:#}");
+}
+
+#[test]
+fn one_of_four_that_is_pushed_by_200_n_walks_on_with_steps_that_change() {
+    let pushed = ["--set", "world.pushes.0.force_n=[200.0, 0.0, 0.0]", "--set", "world.pushes.0.at_s=10.1"];
+    let hard = [&pushed[..], &["--set", "thresholds.zmp_margin_min_m="]].concat();
+    let summary = passed("pushed.toml", &hard);
+    assert!(summary["faults"].as_array().is_some_and(Vec::is_empty), "{summary:#}");
+
+    let results = Results::new();
+    let stiff = [&["--in-process", "--no-log", "--set", "balance.adjusts_steps=false"], &hard[..]].concat();
+    let said = run(&of_project("pushed.toml"), &stiff, &results);
+    assert_eq!(said.status, Some(1), "without them its team stops: {said:#?}");
+}
+
+#[test]
+fn a_team_walks_over_slippery_soft_patches_that_it_knows_nothing_of() {
+    let patches = ["world.ground.step_m=0", "world.ground.slope_deg=0", "world.ground.patch_friction=0.3"];
+    let arguments: Vec<_> = patches.iter().flat_map(|patch| ["--set", patch]).collect();
+    passed("uneven.toml", &arguments);
+}
