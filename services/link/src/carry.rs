@@ -8,6 +8,7 @@ use crate::ports;
 use crate::session::SessionError;
 use crate::task::Task;
 use crate::traffic::{Destination, Incoming, Outgoing, Source, Traffic, Turn, services_of};
+use core::sync::atomic::{AtomicU64, Ordering};
 use mikoshi_ipc_types::{Payload, RobotState, Sensors, ServiceId, TeamCommand};
 use mikoshi_resolution::Crossing;
 use mikoshi_runtime::{IceoryxLink, LinkBell, StandIn, State, TickError, Topic, WaitPolicy, now_ns};
@@ -190,6 +191,7 @@ impl<'a> Carrier<'a> {
             topic,
             host: crossing.from_host,
             counters: Counters::default(),
+            next_tick: AtomicU64::new(0),
             latencies: Mutex::default(),
             round_trips: Mutex::default(),
         });
@@ -213,6 +215,9 @@ impl<'a> Carrier<'a> {
                     Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => Err(Refusal::Flood),
                 }
             });
+            if let Ok((_, tick)) = judged {
+                source.next_tick.store(tick.saturating_add(1), Ordering::Release);
+            }
             source.counters.count(&judged);
             if let Ok((header, tick)) = judged {
                 bell.ring();

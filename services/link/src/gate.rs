@@ -7,7 +7,7 @@ use crate::message::Header;
 use bytemuck::pod_read_unaligned;
 use core::sync::atomic::{AtomicU64, Ordering};
 use mikoshi_ipc_types::{Envelope, Frame, Payload};
-use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Why something was not let through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -93,12 +93,12 @@ impl Counters {
             Ok(_) => &self.accepted,
             Err(refusal) => &self.refused[*refusal as usize],
         };
-        counter.fetch_add(1, Ordering::Relaxed);
+        counter.fetch_add(1, Ordering::Release);
     }
 
     /// What was let through.
     pub fn accepted(&self) -> u64 {
-        self.accepted.load(Ordering::Relaxed)
+        self.accepted.load(Ordering::Acquire)
     }
 
     /// What was not, by reason, where there is any.
@@ -108,11 +108,10 @@ impl Counters {
             .map(|(refusal, count)| (refusal.name(), count.load(Ordering::Relaxed)))
             .filter(|(_, count)| *count > 0)
     }
-}
 
-impl Serialize for Counters {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map([("accepted", self.accepted())].into_iter().chain(self.refused()))
+    /// All of it, at this moment.
+    pub fn snapshot(&self) -> BTreeMap<&'static str, u64> {
+        [("accepted", self.accepted())].into_iter().chain(self.refused()).collect()
     }
 }
 

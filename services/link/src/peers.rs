@@ -253,7 +253,7 @@ impl Peers {
                     is_of_another_run: peer.is_foreign.load(Ordering::Relaxed) != 0,
                     round_trip_s,
                     clock_ahead_s,
-                    hello: &peer.counters,
+                    hello: peer.counters.snapshot(),
                 }
             })
             .collect()

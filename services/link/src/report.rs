@@ -10,6 +10,7 @@ use core::time::Duration;
 use mikoshi_config::RunSpec;
 use mikoshi_runtime::Board;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
@@ -59,7 +60,9 @@ struct Report<'a> {
 struct TopicReport<'a> {
     topic: String,
     from: &'a str,
-    frames: &'a crate::gate::Counters,
+    frames: BTreeMap<&'static str, u64>,
+    /// Of the newest frame that was let through.
+    newest_tick: Option<u64>,
     one_way: Option<Quantiles>,
     round_trip: Option<Quantiles>,
 }
@@ -75,7 +78,9 @@ impl Reported {
             .map(|source| TopicReport {
                 topic: source.topic.to_string(),
                 from: &self.names[source.host],
-                frames: &source.counters,
+                // In this order: no more frames than ticks were let through.
+                frames: source.counters.snapshot(),
+                newest_tick: source.next_tick.load(Ordering::Acquire).checked_sub(1),
                 one_way: quantiles(&source.latencies),
                 round_trip: quantiles(&source.round_trips),
             })

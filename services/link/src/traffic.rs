@@ -5,6 +5,7 @@ use crate::latency::{Latencies, SentTimes};
 use crate::peers::Peers;
 use crate::ports::{Inlet, Outlet};
 use crate::task::Task;
+use core::sync::atomic::AtomicU64;
 use core::time::Duration;
 use mikoshi_ipc_types::{ServiceId, operator};
 use mikoshi_runtime::{Board, Clock, IceoryxLink, Position, Role, StandIn, State, TickError, Topic, now_ns};
@@ -60,6 +61,8 @@ pub struct Source {
     pub host: usize,
     /// What became of it.
     pub counters: Counters,
+    /// The tick after that of the newest frame that was let through; 0 before. It is told before the frame is counted.
+    pub next_tick: AtomicU64,
     /// How long it was on its way.
     pub latencies: Mutex<Latencies>,
     /// How long after what it answers was sent it came.
