@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(counters.accepted(), 1);
         assert_eq!(counters.refused().collect::<Vec<_>>(), [("late", 2), ("stale", 1)]);
         assert_eq!(
-            serde_json::to_string(&counters).expect("it is JSON"),
+            serde_json::to_string(&counters.snapshot()).expect("it is JSON"),
             r#"{"accepted":1,"late":2,"stale":1}"#
         );
     }

@@ -10,6 +10,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_runtime::{Board, Role, State, now_ns};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 /// Exchanges of which the shortest tells what the clock shows: it waited least.
@@ -75,7 +76,7 @@ pub struct PeerReport<'a> {
     is_of_another_run: bool,
     round_trip_s: Option<f64>,
     clock_ahead_s: Option<f64>,
-    hello: &'a Counters,
+    hello: BTreeMap<&'static str, u64>,
 }
 
 impl Peers {
