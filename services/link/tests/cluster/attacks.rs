@@ -2,11 +2,11 @@
 
 use crate::or_skip;
 use crate::team::{HEAD, Plan, RUN, STAGE, Team, robot_host};
-use crate::walk::{tell, walk};
+use crate::walk::{stopped_by, tell, walk};
 use crate::wire::Way;
 use mikoshi_runtime::{now_ns, sleep_until};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
 fn hostile() -> PathBuf {
@@ -75,8 +75,12 @@ const OTHERS: &str = "mikoshi/service/servo/*/robot-state/head";
 
 #[test]
 fn what_others_try_is_refused_and_counted_and_the_team_walks_on() {
+    stopped_by(&[], is_attacked);
+}
+
+fn is_attacked() -> Value {
     let plan = walk(2, 0.06, &["duration_s=40", "motion.random.duration_s=30"]);
-    let mut team = or_skip!(Team::gather(&plan));
+    let mut team = or_skip!(Team::gather(&plan), Value::Null);
     let head = team.cluster.index_of(HEAD);
     team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(0.2));
     team.start();
@@ -107,19 +111,17 @@ fn what_others_try_is_refused_and_counted_and_the_team_walks_on() {
             assert!(said["connected"] == true && counted > sent / 2, "{kind}: {said}, {counted} refused");
         }
         let stolen = ours.run(OTHERS, "replay", &["--robot", "0"]);
-        sleep_until(now_ns() + 1_200_000_000);
         let by_access_control =
-            team.report(HEAD)["refused_by_access_control"].as_u64().expect("it is counted");
+            || team.report(HEAD)["refused_by_access_control"].as_u64().expect("it is counted");
+        team.wait_until(1000, || by_access_control() > 100);
+        let by_access_control = by_access_control();
         eprintln!("another robot's key: {stolen}, {by_access_control} refused by access control");
         assert!(stolen["connected"] == true && by_access_control > 100);
     }
     for host in [STAGE, HEAD] {
         tell(&team, host);
     }
-    let summary = team.finish();
-    assert_eq!(summary["fell"], Value::Array(vec![]));
-    assert_eq!(summary["faults"], Value::Array(vec![]), "nothing of it stopped the team");
-    assert!(Path::new(&plan.certificates()).exists());
+    team.finish()
 }
 
 /// The 99th percentile of a tick over so many seconds, as the world's host sees it.

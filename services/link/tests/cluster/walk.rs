@@ -47,9 +47,44 @@ pub fn tell(team: &Team<'_>, host: &str) -> Value {
     report
 }
 
+/// What stopped the team.
+pub fn faults(summary: &Value) -> Vec<&str> {
+    let faults = summary["faults"].as_array().expect("a list");
+    faults.iter().map(|fault| fault["code"].as_str().unwrap_or_default()).collect()
+}
+
+/// Ends without a fall, by no other stops than these; `Null` where there are no hosts.
+///
+/// A machine that stalls for longer than commands may be late has the team stop, rightly. Such a run says nothing of the way,
+/// and is made again, twice at most. Nothing else is: who falls has fallen.
+pub fn stopped_by(expected: &[&str], run: impl Fn() -> Value) -> Value {
+    for is_last in [false, false, true] {
+        let summary = run();
+        if summary.is_null() {
+            return summary;
+        }
+        assert_eq!(summary["fell"], Value::Array(vec![]));
+        let faults = faults(&summary);
+        let is_by_stalls = faults.len() > expected.len() && faults.iter().all(|code| *code == "input-stale");
+        if is_last || !is_by_stalls {
+            assert_eq!(faults, expected);
+            return summary;
+        }
+        eprintln!("stopped by a machine that stalls: {} {}", summary["timing"], summary["faults"]);
+    }
+    unreachable!("the last one is judged")
+}
+
 fn completes(delay_ms: f64, delay_ticks: u64, loop_gain: f64, more: &[&str]) {
+    let summary = stopped_by(&[], || walks(delay_ms, delay_ticks, loop_gain, more));
+    if !summary.is_null() {
+        assert_eq!(summary["ticks"], 2800);
+    }
+}
+
+fn walks(delay_ms: f64, delay_ticks: u64, loop_gain: f64, more: &[&str]) -> Value {
     let plan = walk(delay_ticks, loop_gain, more);
-    let mut team = or_skip!(Team::gather(&plan));
+    let mut team = or_skip!(Team::gather(&plan), Value::Null);
     let head = team.cluster.index_of(HEAD);
     team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(delay_ms));
     team.start();
@@ -60,9 +95,7 @@ fn completes(delay_ms: f64, delay_ticks: u64, loop_gain: f64, more: &[&str]) {
     let summary = team.finish();
     eprintln!("{delay_ms} ms, {delay_ticks} ticks: {}\n{}", summary["failures"], summary["object"]);
     eprintln!("{} {}", summary["timing"], summary["faults"]);
-    assert_eq!(summary["fell"], Value::Array(vec![]));
-    assert_eq!(summary["faults"], Value::Array(vec![]));
-    assert_eq!(summary["ticks"], 2800);
+    summary
 }
 
 #[test]
