@@ -10,7 +10,7 @@
 //! config/robots/MODEL.toml, URDF ──▶ LoadedRobot ─┘
 //! ```
 //!
-//! `config/sweeps/NAME.toml` names a scenario and what lies over it in each of many runs.
+//! `config/sweeps/NAME.toml` names a scenario and what lies over it in each of many runs, or sweeps that are judged together.
 
 mod coordination;
 mod decode;
@@ -29,6 +29,7 @@ pub mod run;
 mod save;
 pub mod scenario;
 mod sharing;
+mod survey;
 pub mod sweep;
 mod validate;
 mod world;
@@ -40,4 +41,5 @@ pub use robot::RobotConfig;
 pub use run::{DecodeRunError, RobotSpec, RunSpec};
 pub use save::{SaveScenarioError, ScenarioTextError, save_scenario, scenario_text};
 pub use scenario::Scenario;
+pub use survey::{LoadedSurvey, Survey, SweepFile, load_sweep_file};
 pub use sweep::{LoadedSweep, Sweep, SweepRun, load_sweep};

@@ -5,9 +5,11 @@ mod hosts;
 mod operator;
 mod robot;
 mod scenario;
+mod survey;
 mod sweep;
 
 pub(crate) use checks::Violation;
 pub(crate) use robot::robot;
 pub(crate) use scenario::{grasping_hands, scenario};
+pub(crate) use survey::survey;
 pub(crate) use sweep::sweep;

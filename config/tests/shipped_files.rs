@@ -1,7 +1,7 @@
 //! The files that Mikoshi ships load, and say what their comments say.
 
 use mikoshi_config::scenario::{Grasp, Scenario};
-use mikoshi_config::{LoadedScenario, load_scenario};
+use mikoshi_config::{LoadedScenario, SweepFile, load_scenario, load_sweep_file};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -123,10 +123,19 @@ fn hold_is_the_papers_section_4_3() {
 fn every_sweep_is_called_as_its_file_and_can_be_run() {
     for name in names_in("sweeps") {
         let path = folder("sweeps").join(&name).with_extension("toml");
-        let loaded = mikoshi_config::load_sweep(&path).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(loaded.sweep.name, name);
-        let scenario = load_scenario(&loaded.scenario, &loaded.runs(1)[0].overrides, None);
-        scenario.unwrap_or_else(|error| panic!("{error}"));
+        let loaded = load_sweep_file(&path).unwrap_or_else(|error| panic!("{error}"));
+        let sweeps = match loaded {
+            SweepFile::Sweep(sweep) => vec![(name, *sweep)],
+            SweepFile::Survey(survey) => {
+                assert_eq!(survey.survey.name, name);
+                survey.survey.sweeps.into_iter().zip(survey.sweeps).collect()
+            }
+        };
+        for (name, loaded) in sweeps {
+            assert_eq!(loaded.sweep.name, name);
+            let scenario = load_scenario(&loaded.scenario, &loaded.runs(1)[0].overrides, None);
+            scenario.unwrap_or_else(|error| panic!("{error}"));
+        }
     }
 }
 

@@ -10,7 +10,7 @@
 //! scenes. What figures show is true; what control saw of it is at most a thin line.
 //!
 //! A sweep of many runs has a figure of its own, their figures over the parameters that they vary in, and
-//! another one where its runs are compared with what the paper predicts.
+//! another one where its runs are compared with what the paper predicts. A survey of many sweeps has a row of panels for each.
 //!
 //! This crate knows no log file, no simulator and no control.
 
@@ -26,6 +26,7 @@ mod render;
 mod run_data;
 mod scene;
 mod style;
+mod survey_page;
 mod sweep;
 mod sweep_page;
 #[cfg(test)]
@@ -36,6 +37,7 @@ pub use comparison::{ComparedRuns, EdgeTime, FollowerDelay, LateRobot, LateRun, 
 pub use error::WriteReportError;
 pub use latency_page::{LatencyReport, LatencyTable, Tail, TickTimeline, write_latency};
 pub use run_data::RunData;
+pub use survey_page::{SurveyReport, SurveyedSweep, write_survey};
 pub use sweep::{SweepFigure, SweepParameter, SweepQuantity};
 pub use sweep_page::{SweepFailure, SweepReport, write_sweep};
 pub use write::{JudgedLimit, ReportedRun, write_report};

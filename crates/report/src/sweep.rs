@@ -45,28 +45,40 @@ const PANEL_HEIGHT_PX: u32 = 170;
 const COLOURS: [plotters::style::RGBColor; 2] = [style::PALETTE[0], style::PALETTE[1]];
 
 pub(crate) fn figure(sweep: &SweepFigure) -> Figure {
-    let ranges: Vec<_> = sweep.quantities.iter().map(|quantity| y_range(quantity, &sweep.failed)).collect();
-    let panel = |parameter, quantity: usize| {
-        panel(parameter, &sweep.quantities[quantity], ranges[quantity].clone(), &sweep.failed)
+    let rows = sweep.parameters.iter().flat_map(|parameter| row(sweep, parameter, ""));
+    of_panels(&sweep.title, &sweep.subtitle, rows.collect(), &[sweep])
+}
+
+/// Several sweeps in one figure: a row for each, over its first parameter; `None` without a sweep.
+pub(crate) fn figure_of_many(title: &str, subtitle: &str, sweeps: &[&SweepFigure]) -> Option<Figure> {
+    let rows = sweeps.iter().filter_map(|sweep| Some((sweep, sweep.parameters.first()?)));
+    let panels: Vec<_> = rows.flat_map(|(sweep, parameter)| row(sweep, parameter, &sweep.title)).collect();
+    (!panels.is_empty()).then(|| of_panels(title, subtitle, panels, sweeps))
+}
+
+/// Every quantity over one parameter; the first panel has the row's title.
+fn row(sweep: &SweepFigure, parameter: &SweepParameter, title: &str) -> Vec<Panel> {
+    let quantities = sweep.quantities.iter().enumerate();
+    let of_quantity = |(column, quantity): (usize, &SweepQuantity)| {
+        let y = y_range(quantity, &sweep.failed);
+        let title = if column == 0 { title } else { "" };
+        Panel { title: title.to_owned(), ..panel(parameter, quantity, y, &sweep.failed) }
     };
-    let quantities = 0..sweep.quantities.len();
-    let panels = sweep
-        .parameters
-        .iter()
-        .flat_map(|parameter| quantities.clone().map(move |quantity| (parameter, quantity)))
-        .map(|(parameter, quantity)| panel(parameter, quantity))
-        .collect();
+    quantities.map(of_quantity).collect()
+}
+
+fn of_panels(title: &str, subtitle: &str, panels: Vec<Panel>, sweeps: &[&SweepFigure]) -> Figure {
     let mut legend = vec![LegendEntry::patch("succeeded", COLOURS[0])];
-    if sweep.failed.contains(&true) {
+    if sweeps.iter().any(|sweep| sweep.failed.contains(&true)) {
         legend.push(LegendEntry::patch("failed, with the run's number; at the edge if beyond", COLOURS[1]));
     }
     legend.push(LegendEntry::line("threshold", limit_stroke()));
     Figure {
-        title: sweep.title.clone(),
-        subtitle: sweep.subtitle.clone(),
+        title: title.to_owned(),
+        subtitle: subtitle.to_owned(),
         caption: "Every run is a dot, or where it failed its number.".to_owned(),
         legend,
-        columns: sweep.quantities.len(),
+        columns: sweeps.first().map_or(1, |sweep| sweep.quantities.len()),
         panels,
         panel_height_px: PANEL_HEIGHT_PX,
         has_equal_scales: false,

@@ -65,7 +65,12 @@ pub fn write_sweep(report: &SweepReport, out: &Path) -> Result<PathBuf, WriteRep
     write_file(out, "index.html", page(&report.name, &html).as_bytes())
 }
 
-fn drawn(scene: &crate::scene::Figure, out: &Path, name: &str) -> Result<String, WriteReportError> {
+/// Draws a figure into files, and for a page.
+pub(crate) fn drawn(
+    scene: &crate::scene::Figure,
+    out: &Path,
+    name: &str,
+) -> Result<String, WriteReportError> {
     let svg = write_figure(scene, out, name)?;
     Ok(figure(name, &format!("{}.", scene.title), &scene.caption, &svg))
 }

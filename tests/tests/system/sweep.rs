@@ -159,6 +159,41 @@ fn a_bad_sweep_is_refused_with_its_line_before_anything_runs() {
     assert!(!out.exists());
 }
 
+/// Two sweeps of which one fails: they are judged together, and each has its own results, too.
+#[test]
+fn a_survey_judges_all_runs_of_its_sweeps_together() {
+    let (copy, path) = with_sweep(
+        "name = \"both\"\ndescription = \"Two\"\nsweeps = [\"light\", \"strict\"]\nsucceed_min = 3\n",
+    );
+    fs::create_dir(copy.path("sweeps/short")).expect("a folder");
+    let light = SHORT.replace("\"short\"", "\"light\"");
+    let strict =
+        SHORT.replace("\"short\"", "\"strict\"").replace("min = 0\nmax = 200", "min = 200\nmax = 200");
+    fs::write(copy.path("sweeps/short/light.toml"), light).expect("it can be written");
+    fs::write(copy.path("sweeps/short/strict.toml"), strict).expect("it can be written");
+    let results = Results::new();
+    let said = sweep(&path, results.path(), &["--runs", "4"]);
+    assert_eq!((said.status, said.error.as_str()), (Some(0), ""), "{said:#?}");
+    for text in [
+        " light    hold       2 of 2",
+        " strict   hold       0 of 2",
+        "Runs of strict that failed",
+        "passed: 2 of 4 runs of 2 sweeps succeeded, expected at least 2",
+    ] {
+        assert!(said.out.contains(text), "no {text:?} in {}", said.out);
+    }
+    for name in ["survey.svg", "survey.png", "index.html", "light/sweep.json", "strict/runs/001/summary.json"]
+    {
+        assert!(results.path().join(name).exists(), "no {name}");
+    }
+    let said = sweep(&path, results.path(), &["--json"]);
+    assert_eq!(said.status, Some(0), "the first runs are not done again: {said:#?}");
+    let result: Value = serde_json::from_str(&said.out).expect("it is JSON");
+    assert_eq!((&result["runs"], &result["succeeded"]), (&6.into(), &3.into()));
+    assert_eq!(result, json(results.path().join("survey.json")));
+    assert_eq!(result["sweeps"][1], json(results.path().join("strict/sweep.json")));
+}
+
 /// Only the bridge can tell that the springs of these runs would explode.
 #[test]
 fn a_run_that_can_not_be_carried_out_ends_the_sweep_and_is_named() {

@@ -43,9 +43,9 @@ impl<'a> Jobs<'a> {
     ///
     /// # Errors
     /// A signal; a run without a result.
-    pub fn perform(mut self, folders: &'a [RunFolder], is_shown: bool) -> Result<(), Failure> {
+    pub fn perform(mut self, folders: &[&'a RunFolder], is_shown: bool) -> Result<(), Failure> {
         let progress = progress(folders.len(), is_shown);
-        let mut waiting = folders.iter().filter(|folder| {
+        let mut waiting = folders.iter().copied().filter(|folder| {
             let is_finished = folder.is_finished();
             progress.inc(u64::from(is_finished));
             !is_finished

@@ -10,10 +10,6 @@ use mikoshi_report::{SweepFailure, SweepReport};
 /// Everything that the page tells; `limits` are those of its runs.
 pub fn report(sweep: &Sweep, result: &SweepResult, limits: &Thresholds) -> SweepReport {
     let medians_and_worst = figures(&result.median).into_iter().zip(figures(&result.worst));
-    let failure = |row: &Row| SweepFailure {
-        run: format!("Run {}, seed {}: {}", row.run, row.seed, parameters(result, row)),
-        causes: row.failures.clone(),
-    };
     SweepReport {
         name: sweep.name.clone(),
         description: sweep.description.clone(),
@@ -24,8 +20,17 @@ pub fn report(sweep: &Sweep, result: &SweepResult, limits: &Thresholds) -> Sweep
                 [name.to_owned(), format!("{median:.2}"), format!("{worst:.2}")]
             })
             .collect(),
-        failures: result.runs.iter().filter(|row| !row.passed).map(failure).collect(),
+        failures: failures(result),
         overview: figure(result, limits),
         comparison: result.comparison.clone(),
     }
+}
+
+/// Runs that did not succeed.
+pub fn failures(result: &SweepResult) -> Vec<SweepFailure> {
+    let failure = |row: &Row| SweepFailure {
+        run: format!("Run {}, seed {}: {}", row.run, row.seed, parameters(result, row)),
+        causes: row.failures.clone(),
+    };
+    result.runs.iter().filter(|row| !row.passed).map(failure).collect()
 }

@@ -77,7 +77,7 @@ impl SweepResult {
 }
 
 /// `of_all` of `all`, for `count` of them, rounded up.
-fn share(of_all: u64, count: u64, all: u64) -> u64 {
+pub fn share(of_all: u64, count: u64, all: u64) -> u64 {
     let product = u128::from(of_all) * u128::from(count);
     u64::try_from(product.div_ceil(u128::from(all.max(1)))).unwrap_or(u64::MAX)
 }

@@ -15,13 +15,7 @@ pub fn report(result: &SweepResult, out: &Path) -> String {
             },
         ),
     );
-    let failed: Vec<_> = result.runs.iter().filter(|row| !row.passed).collect();
-    if !failed.is_empty() {
-        text += "\nRuns that failed\n";
-    }
-    for row in failed {
-        text += &failure(result, row);
-    }
+    text += &failures(result);
     if !result.findings.is_empty() {
         text += "\nBeside the paper\n";
     }
@@ -62,6 +56,17 @@ pub fn figures(figures: &Figures) -> [(&'static str, f64); 8] {
         ("internal end N", figures.internal_end_n),
         ("internal end Nm", figures.internal_end_nm),
     ]
+}
+
+/// Runs that did not succeed, below a line that says so; nothing if all did.
+pub fn failures(result: &SweepResult) -> String {
+    let mut failed = result.runs.iter().filter(|row| !row.passed).peekable();
+    let mut text = match failed.peek() {
+        Some(_) => format!("\nRuns of {} that failed\n", result.sweep),
+        None => String::new(),
+    };
+    failed.for_each(|row| text += &failure(result, row));
+    text
 }
 
 /// A run's causes, and what was drawn for it.
