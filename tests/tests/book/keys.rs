@@ -31,7 +31,7 @@ const PARTS: [(&str, &[&str]); 3] = [
         ],
     ),
     ("Robots", &["robot.rs"]),
-    ("Sweeps", &["sweep.rs", "sweep/grid.rs", "sweep/range.rs", "sweep/comparison.rs"]),
+    ("Sweeps", &["survey.rs", "sweep.rs", "sweep/grid.rs", "sweep/range.rs", "sweep/comparison.rs"]),
 ];
 
 /// What a key holds and means.
