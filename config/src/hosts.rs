@@ -12,6 +12,10 @@ pub struct Host {
     pub name: String,
     /// What runs there: `bridge`, `coordinator`, and servos by the names of their robots.
     pub services: Vec<String>,
+    /// For whom it stands by, should their host be lost. `coordinator`: a second one is ready here, and takes over. The
+    /// name of a robot: what its servo needs to go on is kept here for the machine that takes the place of its own.
+    #[serde(default)]
+    pub standbys: Vec<String>,
     /// Where its link listens to the others, as `ADDRESS:PORT`.
     pub listen: String,
 }
@@ -55,6 +59,20 @@ impl Scenario {
         let runs_there =
             |host: &Host| host.services.iter().any(|name| self.service_called(name) == Some(service));
         self.hosts.iter().position(runs_there)
+    }
+
+    /// The index of the host that stands by for this service, if one does.
+    pub fn standby_of(&self, service: ServiceId) -> Option<usize> {
+        let stands_by =
+            |host: &Host| host.standbys.iter().any(|name| self.service_called(name) == Some(service));
+        self.hosts.iter().position(stands_by)
+    }
+
+    /// The indices of the hosts on which this service may be in charge, its own first. A robot's servo is where its
+    /// robot is.
+    pub fn places_of(&self, service: ServiceId) -> impl Iterator<Item = usize> + use<> {
+        let standby = self.standby_of(service).filter(|_| service == ServiceId::Coordinator);
+        self.host_of(service).into_iter().chain(standby)
     }
 
     /// The index of the host whose tick is the clock.

@@ -3,7 +3,7 @@
 use super::checks::Checks;
 use crate::hosts::{BRIDGE, COORDINATOR};
 use crate::scenario::Scenario;
-use mikoshi_ipc_types::MAX_ROBOTS;
+use mikoshi_ipc_types::{MAX_ROBOTS, ServiceId};
 
 /// A service on each.
 const MAX_HOSTS: usize = MAX_ROBOTS + 2;
@@ -52,8 +52,33 @@ pub(super) fn hosts(checks: &mut Checks, scenario: &Scenario) {
             }
         }
     }
+    standbys(checks, scenario);
     for (name, count) in places {
         let found = format_args!("no host of {name:?}").to_string();
         checks.require(count > 0, "hosts", found, "each service on one host");
     }
+}
+
+/// A service has one standby at most, on another host than its own.
+fn standbys(checks: &mut Checks, scenario: &Scenario) {
+    let mut seen: Vec<&str> = vec![];
+    for (index, host) in scenario.hosts.iter().enumerate() {
+        for (at, name) in host.standbys.iter().enumerate() {
+            let key = format!("hosts.{index}.standbys.{at}");
+            let found = format!("{name:?}");
+            let service = scenario.service_called(name).filter(|service| *service != ServiceId::Bridge);
+            let expected = "the coordinator, or a robot; nothing stands by for the world";
+            checks.require(service.is_some(), &key, &found, expected);
+            let is_elsewhere = !host.services.contains(name);
+            checks.require(is_elsewhere, &key, format_args!("{found}, which runs there"), "another host's");
+            let is_first = !seen.contains(&&**name);
+            checks.require(is_first, &key, format_args!("{found} again"), "one standby for each");
+            seen.push(name);
+        }
+    }
+    let clock = scenario.link.clock.as_ref().and_then(|_| scenario.clock_host());
+    let is_lasting = clock.is_none() || clock != scenario.host_of(ServiceId::Coordinator);
+    let has_standby = scenario.standby_of(ServiceId::Coordinator).is_some();
+    let found = "the host of a coordinator that has a standby";
+    checks.require(is_lasting || !has_standby, "link.clock", found, "a clock that stays where it is");
 }

@@ -21,22 +21,28 @@ pub struct Crossing {
 }
 
 /// All that goes from host to host in a tick: what services elsewhere wait for; and to the host of the bridge, where a
-/// run is recorded, everything. What is true of the world stays there.
+/// run is recorded, everything. What is true of the world stays there. A service that has places on two hosts says it on
+/// one of them, and hears it on both.
 pub fn crossings(run: &RunSpec, schedule: &TickSchedule) -> Vec<Crossing> {
     let scenario = &run.scenario;
     let recording = scenario.host_of(ServiceId::Bridge);
     let of_output = |(from, output): (ServiceId, &Output)| {
-        let from_host = scenario.host_of(from);
         let consumers =
-            schedule.consumers_of(output.topic).filter_map(|(consumer, _)| scenario.host_of(consumer));
+            schedule.consumers_of(output.topic).flat_map(|(consumer, _)| scenario.places_of(consumer));
         let consumers: BTreeSet<usize> = consumers.collect();
         let hosts: BTreeSet<usize> = consumers.iter().copied().chain(recording).collect();
-        let crossing = |to_host: usize| {
-            let from_host = from_host.filter(|host| *host != to_host)?;
-            let is_awaited = consumers.contains(&to_host);
-            Some(Crossing { output: *output, from, from_host, to_host, is_awaited })
+        let from_host = |from_host: usize| {
+            let others = hosts.iter().copied().filter(move |host| *host != from_host);
+            let is_awaited = |host| consumers.contains(&host);
+            others.map(move |to_host| Crossing {
+                output: *output,
+                from,
+                from_host,
+                to_host,
+                is_awaited: is_awaited(to_host),
+            })
         };
-        hosts.into_iter().filter_map(crossing).collect::<Vec<_>>()
+        scenario.places_of(from).flat_map(from_host).collect::<Vec<_>>()
     };
     schedule.outputs().flat_map(of_output).collect()
 }
@@ -49,7 +55,9 @@ pub fn services_on_board(run: &RunSpec, schedule: &TickSchedule, host: usize) ->
         crossings.iter().any(|crossing| crossing.from == *service && crossing.to_host == host)
     };
     let has_place = |service: &ServiceId| {
-        *service == ServiceId::Bridge || run.scenario.host_of(*service) == Some(host) || comes(service)
+        *service == ServiceId::Bridge
+            || run.scenario.places_of(*service).any(|place| place == host)
+            || comes(service)
     };
     schedule.services().into_iter().filter(has_place).collect()
 }

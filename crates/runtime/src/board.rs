@@ -173,6 +173,8 @@ pub(crate) struct Slot {
     message_length: AtomicU32,
     /// The board's generation whose processes it is connected to.
     welcomed: AtomicU32,
+    /// 1 while no process of this host may be in charge: the service is on another host, or may be.
+    reserved: AtomicU32,
     progress: Progress,
     /// Where its owner sleeps alone.
     pub(crate) bed: Bed,
@@ -188,6 +190,10 @@ pub(crate) struct Slot {
 struct Progress {
     /// A [`Position`].
     position: AtomicU64,
+    /// A [`ProcessIdentity`]: who stood by last.
+    standby: AtomicU64,
+    /// Which of the hosts on which it may be the service is on, as far as this one knows: how often it has moved.
+    moves: AtomicU64,
     /// How often its owner has asked for memory, where it counts that.
     allocations: AtomicU64,
 }
@@ -367,6 +373,26 @@ impl Slot {
         Ok(epoch)
     }
 
+    /// Whether no process of this host may be in charge.
+    pub(crate) fn is_reserved(&self) -> bool {
+        self.reserved.load(Ordering::Acquire) != 0
+    }
+
+    pub(crate) fn set_reserved(&self, is_reserved: bool) {
+        self.reserved.store(u32::from(is_reserved), Ordering::Release);
+    }
+
+    /// Nobody has it any more.
+    pub(crate) fn vacate(&self) {
+        self.set_state(State::Absent);
+        self.owner.store(0, Ordering::Release);
+    }
+
+    /// Says that this process stands by.
+    pub(crate) fn set_standby(&self, process: ProcessIdentity) {
+        self.progress.standby.store(process.to_word(), Ordering::Release);
+    }
+
     /// Asks whoever has the slot to make room at the next tick.
     pub(crate) fn ask_to_retire(&self) {
         self.retirement.store(1, Ordering::Release);
@@ -457,7 +483,7 @@ const DRIVE_WORDS: usize = size_of::<Drive>() / size_of::<u64>();
 const PUSH_WORDS: usize = size_of::<Push>() / size_of::<u64>();
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikosh10");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikosh11");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -495,12 +521,21 @@ impl Board {
     }
 
     /// The same for one host of several: with a place for its link, and with those services only that live there or
-    /// that those exchange frames with.
+    /// that those exchange frames with. Nobody takes a `reserved` one before its link says so.
     ///
     /// # Errors
     /// As [`Board::create`].
-    pub fn create_for_host(directory: &Path, services: &[ServiceId]) -> Result<Self, BoardError> {
-        Self::create_for(directory, services, false, true)
+    pub fn create_for_host(
+        directory: &Path,
+        services: &[ServiceId],
+        reserved: &[ServiceId],
+    ) -> Result<Self, BoardError> {
+        let board = Self::create_for(directory, services, false, true)?;
+        for slot in board.slots() {
+            let is_reserved = |service| slot.role() == Some(Role::Service(service));
+            slot.set_reserved(reserved.iter().copied().any(is_reserved));
+        }
+        Ok(board)
     }
 
     fn create_for(
@@ -605,6 +640,42 @@ impl Board {
     pub fn charge_of(&self, service: ServiceId) -> Option<(u64, Position)> {
         let charge = self.index_of(Role::Service(service)).map(|index| self.slots()[index].charge())?;
         Some((charge.epoch, charge.since))
+    }
+
+    /// Whether no process of this host may be in charge of this service.
+    pub fn is_reserved(&self, service: ServiceId) -> bool {
+        self.slot_of(service).is_some_and(Slot::is_reserved)
+    }
+
+    /// Lets a process of this host take the place of this service.
+    pub fn admit(&self, service: ServiceId) {
+        if let Some(slot) = self.slot_of(service) {
+            slot.set_reserved(false);
+            self.wake_all();
+        }
+    }
+
+    /// Whether a living process stands by for this service, or waits for its place.
+    pub fn has_standby(&self, service: ServiceId) -> bool {
+        let standby = |slot: &Slot| slot.progress.standby.load(Ordering::Acquire);
+        let standby = self.slot_of(service).and_then(|slot| ProcessIdentity::from_word(standby(slot)));
+        standby.is_some_and(|process| process.is_alive())
+    }
+
+    /// How often this service has moved from host to host, as far as is known here.
+    pub fn moves_of(&self, service: ServiceId) -> u64 {
+        self.slot_of(service).map_or(0, |slot| slot.progress.moves.load(Ordering::Acquire))
+    }
+
+    /// Says how often it has. A number that was said is not taken back.
+    pub fn set_moves(&self, service: ServiceId, moves: u64) {
+        if let Some(slot) = self.slot_of(service) {
+            slot.progress.moves.fetch_max(moves, Ordering::AcqRel);
+        }
+    }
+
+    fn slot_of(&self, service: ServiceId) -> Option<&Slot> {
+        self.index_of(Role::Service(service)).and_then(|index| self.slots().get(index))
     }
 
     /// What all slots say, in order.

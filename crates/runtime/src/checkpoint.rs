@@ -37,8 +37,8 @@ pub(crate) struct CheckpointWriter {
 }
 
 /// What a successor goes on from.
-#[derive(Debug, PartialEq)]
-pub(crate) struct Checkpoint {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
     /// The phase that had been computed.
     pub position: Position,
     /// Names the layout of the state.
@@ -56,14 +56,13 @@ impl CheckpointWriter {
         schema: u64,
         state_bytes: usize,
     ) -> io::Result<Self> {
+        Self::create_at(&run.join(format!("{}{epoch}", prefix(service))), schema, state_bytes)
+    }
+
+    fn create_at(path: &Path, schema: u64, state_bytes: usize) -> io::Result<Self> {
         let slot_bytes = LINE_BYTES + state_bytes.next_multiple_of(LINE_BYTES);
         let size = LINE_BYTES + 2 * slot_bytes;
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(run.join(format!("{}{epoch}", prefix(service))))?;
+        let file = OpenOptions::new().read(true).write(true).create_new(true).mode(0o600).open(path)?;
         // Allocated, not only sized: a page that shared memory has no room for would fault in a tick.
         rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size as u64)?;
         // SAFETY: the file was just made, nobody truncates it (only its user may enter the run's directory),
@@ -124,6 +123,78 @@ pub(crate) fn latest(run: &Path, service: ServiceId) -> io::Result<Option<Checkp
         }
     }
     Ok(latest)
+}
+
+/// What this epoch of a service has kept last; none if that is nothing, or is being written.
+///
+/// # Errors
+/// It can't be read.
+pub fn kept_by(run: &Path, service: ServiceId, epoch: u64) -> io::Result<Option<Checkpoint>> {
+    let bytes = match std::fs::read(run.join(format!("{}{epoch}", prefix(service)))) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        bytes => bytes?,
+    };
+    Ok(read(&bytes).into_iter().flatten().max_by_key(|checkpoint| checkpoint.position))
+}
+
+/// Has nobody go on from what any epoch of this service has kept here.
+pub(crate) fn discard(run: &Path, service: ServiceId) -> io::Result<()> {
+    files(run, service)?.into_iter().try_for_each(std::fs::remove_file)
+}
+
+/// What a service on another host has kept, for a successor on this one.
+pub struct CheckpointCopy {
+    run: PathBuf,
+    service: ServiceId,
+    /// Once something has come, and what of it has the room of what it is.
+    writer: Option<(CheckpointWriter, u64, usize)>,
+}
+
+/// The epoch of nobody, by which copies are known.
+const COPY_EPOCH: u64 = 0;
+
+impl CheckpointCopy {
+    /// For this service of the run in this directory.
+    pub fn new(run: &Path, service: ServiceId) -> Self {
+        Self { run: run.to_path_buf(), service, writer: None }
+    }
+
+    /// The last that was kept.
+    ///
+    /// # Errors
+    /// It can't be read.
+    pub fn latest(&self) -> io::Result<Option<Checkpoint>> {
+        kept_by(&self.run, self.service, COPY_EPOCH)
+    }
+
+    /// Keeps it.
+    ///
+    /// # Errors
+    /// It can't be written.
+    pub fn keep(&mut self, checkpoint: &Checkpoint) -> io::Result<()> {
+        let Checkpoint { position, schema, state } = checkpoint;
+        let fits = |(_, of, room): &(CheckpointWriter, u64, usize)| of == schema && state.len() <= *room;
+        if !self.writer.as_ref().is_some_and(fits) {
+            // It gets its name with what it holds: what was there before is good until then.
+            let path = self.run.join(format!("copy-of-{}", self.service));
+            let _ = std::fs::remove_file(&path);
+            let mut writer = CheckpointWriter::create_at(&path, *schema, state.len())?;
+            Self::write(&mut writer, *position, state)?;
+            std::fs::rename(&path, self.run.join(format!("{}{COPY_EPOCH}", prefix(self.service))))?;
+            self.writer = Some((writer, *schema, state.len()));
+            return Ok(());
+        }
+        self.writer.as_mut().map_or(Ok(()), |(writer, ..)| Self::write(writer, *position, state))
+    }
+
+    fn write(writer: &mut CheckpointWriter, position: Position, state: &[u8]) -> io::Result<()> {
+        let save = |room: &mut [u8]| {
+            let room = room.get_mut(..state.len()).ok_or(TickError::Checkpoint("no room"))?;
+            room.copy_from_slice(state);
+            Ok(state.len())
+        };
+        writer.write(position, save).map_err(io::Error::other)
+    }
 }
 
 fn prefix(service: ServiceId) -> String {

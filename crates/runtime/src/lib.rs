@@ -36,6 +36,7 @@ mod wait;
 pub use allocations::CountingAllocator;
 pub use awake::{AwakeError, cores_to_keep_awake, keep_awake};
 pub use board::{Board, BoardError, Role, SlotStatus, State};
+pub use checkpoint::{Checkpoint, CheckpointCopy, kept_by};
 pub use domain::{Domain, DomainError};
 pub use double::Double;
 pub use driver::{Driver, TakeWheelError};

@@ -98,7 +98,8 @@ impl Member {
             return Err(JoinError::Occupied { role, owner });
         }
         let is_enlisted = entry == Entry::Enlist;
-        let entry = if is_enlisted && owner.is_some() { Entry::Standby } else { entry };
+        let is_second = owner.is_some() || slot.is_reserved();
+        let entry = if is_enlisted && is_second { Entry::Standby } else { entry };
         // Of observers and supervisors there is no state to go on from.
         let is_first = entry != Entry::Standby && slot.epoch() == 0 || !matches!(role, Role::Service(_));
         let mut member = Self {
@@ -178,7 +179,7 @@ impl Member {
     pub(crate) fn wait_for_vacancy(&self, pace: Option<&Pace>) -> Result<Option<ProcessIdentity>, TickError> {
         let slot = self.slot();
         // While it was set up another may have come first.
-        let is_second = self.entry == Entry::Enlist && slot.living_owner().is_some();
+        let is_second = self.entry == Entry::Enlist && (slot.living_owner().is_some() || slot.is_reserved());
         if self.entry == Entry::Standby || is_second {
             return self.stand_by(pace);
         }
@@ -199,10 +200,13 @@ impl Member {
             let world = world.map_or(Position::default(), Slot::position);
             world.tick >= slot.position().tick.saturating_add(patience_ticks)
         };
+        slot.set_standby(ProcessIdentity::own().map_err(|_| TickError::Aborted)?);
         loop {
             let look_ns = now_ns().saturating_add((period_ns / 2).max(LEAST_LOOK_NS));
             // Whoever makes room does so for another, who is ready; unless that is lost, too.
-            let gone = || self.has_exited(self.slot).then_some(());
+            let is_vacant =
+                || !slot.is_reserved() && (slot.process().is_none() || self.has_exited(self.slot));
+            let gone = || is_vacant().then_some(());
             let is_gone = self.wait_beside(Some(look_ns), || Ok(gone()))?.is_some();
             if slot.state() == State::Done || self.board.stop_is_requested() {
                 return Err(TickError::Stopped);
@@ -210,11 +214,28 @@ impl Member {
             if is_gone {
                 return Ok(None);
             }
-            let is_to_work = matches!(slot.state(), State::Running | State::Retired);
+            let is_to_work = matches!(slot.state(), State::Running | State::Retired) && !slot.is_reserved();
             if pace.is_some() && is_to_work && is_behind() {
                 return Ok(slot.process());
             }
         }
+    }
+
+    /// Leaves its place to whoever of this host stands by for it.
+    pub(crate) fn vacate(&self) {
+        let slot = self.slot();
+        if self.is_in_charge() && slot.process() == ProcessIdentity::own().ok() {
+            slot.vacate();
+        }
+        slot.set_reserved(false);
+        self.board.wake_all();
+    }
+
+    /// Takes the place from whoever of this host has it: it is fenced, and ends.
+    pub(crate) fn seize(&self) -> Result<(), JoinError> {
+        let slot = self.slot();
+        slot.set_reserved(true);
+        self.take_charge(slot.position(), slot.process())
     }
 
     /// Waits beside the bed that whoever is in charge sleeps in.
@@ -234,7 +255,7 @@ impl Member {
         })
     }
 
-    fn is_in_charge(&self) -> bool {
+    pub(crate) fn is_in_charge(&self) -> bool {
         self.slot().epoch() == self.epoch()
     }
 

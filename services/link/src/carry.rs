@@ -6,6 +6,7 @@ use crate::message::{HEADER_BYTES, Header};
 use crate::peers::Peers;
 use crate::ports;
 use crate::session::SessionError;
+use crate::standby::{Kept, Standby};
 use crate::task::Task;
 use crate::traffic::{Destination, Incoming, Outgoing, Source, Traffic, Turn, services_of};
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -46,16 +47,27 @@ impl<'a> Carrier<'a> {
             .map_err(|error| SessionError::of("link", error))?;
         let mut stand_ins = vec![];
         for (service, _) in services_of(link.board()) {
-            if task.run.scenario.host_of(service) != Some(task.host) {
-                let stand_in = StandIn::take_place(task.directory, service, policy, task.schedule)
-                    .map_err(|error| SessionError::of(format!("place of {service}"), error))?;
-                stand_ins.push((service, stand_in));
-            }
+            peers.recall_moves(service, link.board().moves_of(service));
+            let may_be_here = task.may_be_here(service);
+            let has_two_places = task.run.scenario.places_of(service).count() > 1;
+            let stand_in = match peers.is_here(service) {
+                // Nobody comes for it, or its place may be that of another one day.
+                true if !has_two_places => continue,
+                true => StandIn::prepare(task.directory, service, policy, task.schedule),
+                false if may_be_here && !link.board().is_reserved(service) => {
+                    StandIn::prepare(task.directory, service, policy, task.schedule)
+                }
+                false => StandIn::take_place(task.directory, service, policy, task.schedule),
+            };
+            let stand_in =
+                stand_in.map_err(|error| SessionError::of(format!("place of {service}"), error))?;
+            stand_ins.push((service, stand_in));
         }
         let traffic = Traffic {
             stand_ins,
             outgoing: vec![],
             incoming: vec![],
+            standbys: vec![],
             again: VecDeque::new(),
             beats: None,
             begun: None,
@@ -86,7 +98,7 @@ impl<'a> Carrier<'a> {
         }
         for crossing in crossings {
             let topic = crossing.output.topic;
-            let key = keys.of_topic(crossing.from, topic, name(crossing.to_host));
+            let key = keys.of_topic(crossing.from, crossing.from_host, topic, name(crossing.to_host));
             if crossing.from_host == own {
                 let publisher = self.publisher(session, &key, crossing.is_awaited)?;
                 let (host, is_awaited) = (crossing.to_host, crossing.is_awaited);
@@ -115,6 +127,9 @@ impl<'a> Carrier<'a> {
             };
             self._subscribers.push(subscribe(session, &keys.beat(name(clock)), beat)?);
         }
+        for service in ServiceId::of_team(self.traffic.task.run.robots.len()) {
+            self.stand_by(session, keys, service)?;
+        }
         for host in self.traffic.task.hosts_of_others() {
             let (peers, bell) = (Arc::clone(&self.traffic.peers), self.bell()?);
             let hear = move |sample: Sample| {
@@ -127,6 +142,25 @@ impl<'a> Carrier<'a> {
         Ok(())
     }
 
+    /// Where this host is one of two for a service: has what is kept go to the other, and come from there.
+    fn stand_by(&mut self, session: &Session, keys: &Keys, service: ServiceId) -> Result<(), SessionError> {
+        let task = &self.traffic.task;
+        let Some(other) = task.other_host_of(service) else { return Ok(()) };
+        let publisher = self.publisher(session, &keys.of_checkpoint(service, task.host, other), false)?;
+        let peers = &self.traffic.peers;
+        let opened = Standby::open(task, service, session, keys, publisher, peers, self.bell()?)?;
+        if let Some((standby, subscriber)) = opened {
+            self.traffic.standbys.push(standby);
+            self._subscribers.push(subscriber);
+        }
+        Ok(())
+    }
+
+    /// What is counted of what is kept here for others, by service.
+    pub fn kept(&self) -> Vec<Arc<Kept>> {
+        self.traffic.standbys.iter().map(|standby| Arc::clone(standby.kept())).collect()
+    }
+
     /// Where this topic, of this host, goes out.
     fn outgoing_of(&mut self, topic: Topic) -> Result<usize, SessionError> {
         let outgoing = &mut self.traffic.outgoing;
@@ -137,7 +171,9 @@ impl<'a> Carrier<'a> {
         let outlet = outlet.map_err(|error| SessionError::of(topic.to_string(), error))?;
         let is_answered = topic.payload == RobotState::NAME;
         let is_beat = topic == Topic::of::<Sensors>(0) && self.traffic.task.host == self.traffic.task.clock();
-        outgoing.push(Outgoing { topic, outlet, destinations: vec![], is_beat, is_answered });
+        let service = self.traffic.task.schedule.producer_of(topic);
+        let service = service.ok_or_else(|| SessionError::of(topic.to_string(), "nobody says it"))?;
+        outgoing.push(Outgoing { topic, service, outlet, destinations: vec![], is_beat, is_answered });
         Ok(outgoing.len() - 1)
     }
 
@@ -179,9 +215,7 @@ impl<'a> Carrier<'a> {
         let schedule = self.traffic.task.schedule;
         let inlet = ports::inlet(self.traffic.stand_ins[stand_in].1.ports(), topic)
             .map_err(|error| failed(&error))?;
-        let is_here = |service: &ServiceId| {
-            self.traffic.task.run.scenario.host_of(*service) == Some(self.traffic.task.host)
-        };
+        let is_here = |service: &ServiceId| self.traffic.task.may_be_here(*service);
         let consumer = schedule.consumers_of(topic).find(|(service, _)| is_here(service));
         let age_ticks = consumer.map_or(0, |(_, input)| input.age_ticks);
         let consumer = consumer.map(|(service, _)| service);
@@ -199,7 +233,7 @@ impl<'a> Carrier<'a> {
         let (sender, arrived): (SyncSender<(u64, Vec<u8>)>, _) = sync_channel(QUEUE);
         let (peers, bell) = (Arc::clone(&self.traffic.peers), self.bell()?);
         let sent = (topic.payload == TeamCommand::NAME).then(|| Arc::clone(&self.traffic.sent));
-        let host = crossing.from_host;
+        let (host, from) = (crossing.from_host, crossing.from);
         // Zenoh calls it from one thread at a time.
         let gate = Mutex::new(move |message: &[u8]| {
             let now = Now {
@@ -209,12 +243,14 @@ impl<'a> Carrier<'a> {
                     .and_then(|service| bell.board().last_position(service))
                     .map(|at| at.tick),
             };
-            let judged = gate.judge(message, now).and_then(|(header, tick, frame)| {
-                match sender.try_send((tick, frame.to_vec())) {
+            // Of two hosts that say it, one is in charge.
+            let entitled = if peers.host_of(from) == Some(host) { Ok(()) } else { Err(Refusal::Epoch) };
+            let judged = entitled.and_then(|()| gate.judge(message, now)).and_then(
+                |(header, tick, frame)| match sender.try_send((tick, frame.to_vec())) {
                     Ok(()) => Ok((header, tick)),
                     Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => Err(Refusal::Flood),
-                }
-            });
+                },
+            );
             if let Ok((_, tick)) = judged {
                 source.next_tick.store(tick.saturating_add(1), Ordering::Release);
             }
@@ -253,7 +289,7 @@ impl<'a> Carrier<'a> {
     pub fn carry(&mut self) -> Result<(), TickError> {
         let Self { link, traffic, .. } = self;
         link.enter(State::Running);
-        for (_, stand_in) in &traffic.stand_ins {
+        for (_, stand_in) in traffic.in_place() {
             stand_in.enter(State::Wired);
         }
         let mut carry = || {
@@ -267,11 +303,11 @@ impl<'a> Carrier<'a> {
         let carried = carry();
         match &carried {
             Ok(()) => {
-                traffic.stand_ins.iter().for_each(|(_, stand_in)| stand_in.conclude());
+                traffic.in_place().for_each(|(_, stand_in)| stand_in.conclude());
                 link.conclude();
             }
             Err(error) => {
-                traffic.stand_ins.iter().for_each(|(_, stand_in)| stand_in.fail(error));
+                traffic.in_place().for_each(|(_, stand_in)| stand_in.fail(error));
                 link.fail(error);
             }
         }
@@ -279,7 +315,7 @@ impl<'a> Carrier<'a> {
     }
 }
 
-fn subscribe(
+pub(crate) fn subscribe(
     session: &Session,
     key: &str,
     callback: impl Fn(Sample) + Send + Sync + 'static,

@@ -12,6 +12,7 @@
 
 pub mod carry;
 pub mod certify;
+pub mod checkpoint;
 pub mod gate;
 pub mod keys;
 pub mod latency;
@@ -21,5 +22,6 @@ pub mod peers;
 pub mod ports;
 pub mod report;
 pub mod session;
+pub mod standby;
 pub mod task;
 pub mod traffic;

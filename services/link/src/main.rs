@@ -88,7 +88,8 @@ fn carry(arguments: &CarryArguments) -> Result<(), ServeError> {
     let session = session::open(&parts, &certificates).map_err(ServeError::fault)?;
     let opened = Carrier::open(task, policy_of(&run), &session, &keys, Arc::clone(&peers));
     let mut carrier = opened.map_err(ServeError::fault)?;
-    let reporter = Reporter::start(&arguments.run, &run, host, &session, &keys, peers, carrier.sources());
+    let counted = (carrier.sources(), carrier.kept());
+    let reporter = Reporter::start(&arguments.run, &run, host, &session, &keys, peers, counted);
     let reporter = reporter.map_err(ServeError::fault)?;
     notify::tell_ready("set up");
     let board = Board::open(&arguments.run).map_err(ServeError::fault)?;

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable, bytes_of, pod_read_unaligned};
 use mikoshi_ipc_types::MAX_ROBOTS;
 
 /// Opens every message, and names its layout.
-const MAGIC: u64 = u64::from_le_bytes(*b"mkslink1");
+const MAGIC: u64 = u64::from_le_bytes(*b"mkslink2");
 
 /// What every message begins with.
 #[repr(C)]
@@ -67,6 +67,8 @@ pub struct Progress {
     pub state: u64,
     /// Its tick.
     pub tick: u64,
+    /// How often it has moved from host to host, its move to this one included.
+    pub moves: u64,
 }
 
 /// When a host was heard last: from it the other one learns how long the way is, and what the clock shows there.

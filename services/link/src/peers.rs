@@ -21,14 +21,41 @@ pub struct Peers {
     own: usize,
     run: [u8; 32],
     incarnation: u64,
-    /// In canonical order, with the host of each.
-    services: Vec<(ServiceId, usize)>,
+    /// In canonical order.
+    services: Vec<Place>,
     peers: Vec<Peer>,
     /// One past the tick that the clock is in; 0 before the first.
     next_tick: AtomicU64,
     /// How often others were heard to say "stop".
     stops: AtomicU64,
 }
+
+/// Where a service lives.
+struct Place {
+    service: ServiceId,
+    /// Its hosts, its own first: it moves from one to the next.
+    hosts: Vec<usize>,
+    /// How often it has: so of two who say that it is with them, everybody knows who is right.
+    moves: AtomicU64,
+}
+
+impl Place {
+    fn host_after(&self, moves: u64) -> Option<usize> {
+        let index = moves.checked_rem(self.hosts.len() as u64)?;
+        self.hosts.get(index as usize).copied()
+    }
+
+    fn moves(&self) -> u64 {
+        self.moves.load(Ordering::Acquire)
+    }
+}
+
+/// No service moves more often.
+const MOST_MOVES: u64 = 1 << 32;
+/// Of whom so long nothing was heard, by most hosts, is lost: another host takes over.
+const LOST: Duration = Duration::from_secs(1);
+/// What was heard of a host so long ago is no testimony.
+const TESTIMONY: Duration = Duration::from_millis(250);
 
 /// One other host.
 struct Peer {
@@ -45,6 +72,8 @@ struct Known {
     services: Vec<Progress>,
     stops: u64,
     heard: Heard,
+    /// For how long it had not heard of each host when it said so; none of whom it never has.
+    silences_ns: Vec<Option<u64>>,
     /// When anything was heard of it, by our clock.
     exchanges: Vec<Exchange>,
     next: usize,
@@ -82,7 +111,10 @@ pub struct PeerReport<'a> {
 impl Peers {
     /// Of host `own` of this run, whose link has this number.
     pub fn new(run: &RunSpec, hash: [u8; 32], own: usize, incarnation: u64) -> Self {
-        let host_of = |service| Some((service, run.scenario.host_of(service)?));
+        let place_of = |service| {
+            let hosts: Vec<usize> = run.scenario.places_of(service).collect();
+            (!hosts.is_empty()).then(|| Place { service, hosts, moves: AtomicU64::new(0) })
+        };
         let peer = |name: &str| Peer {
             name: name.to_owned(),
             counters: Counters::default(),
@@ -94,7 +126,7 @@ impl Peers {
             own,
             run: hash,
             incarnation,
-            services: ServiceId::of_team(run.robots.len()).filter_map(host_of).collect(),
+            services: ServiceId::of_team(run.robots.len()).filter_map(place_of).collect(),
             peers: run.scenario.hosts.iter().map(|host| peer(&host.name)).collect(),
             next_tick: AtomicU64::new(0),
             stops: AtomicU64::new(0),
@@ -119,8 +151,10 @@ impl Peers {
     /// What we say of ourselves.
     pub fn hello(&self, board: &Board) -> Vec<u8> {
         let mut hello = Hello { run: self.run, stops: board.stops(), ..Hello::zeroed() };
-        for (place, (service, host)) in hello.services.iter_mut().zip(&self.services) {
-            if *host == self.own {
+        for (place, known) in hello.services.iter_mut().zip(&self.services) {
+            let (service, moves) = (&known.service, known.moves());
+            if known.host_after(moves) == Some(self.own) {
+                place.moves = moves;
                 let state = board
                     .states()
                     .find_map(|(role, state)| (role == Role::Service(*service)).then_some(state));
@@ -150,6 +184,9 @@ impl Peers {
             peer.is_foreign.store(1, Ordering::Relaxed);
             return Err(Refusal::Run);
         }
+        if hello.services.iter().any(|service| service.moves > MOST_MOVES) {
+            return Err(Refusal::Malformed);
+        }
         // A link that was started anew has a larger number than its predecessor.
         let last = peer.incarnation.fetch_max(header.incarnation, Ordering::AcqRel);
         if header.incarnation < last {
@@ -166,6 +203,11 @@ impl Peers {
             known.next = 0;
         }
         known.heard = Heard { sent_ns: header.sent_ns, came_ns };
+        let silence_ns = |heard: &Heard| {
+            let has_heard = heard.came_ns > 0;
+            has_heard.then(|| header.sent_ns.saturating_sub(heard.came_ns))
+        };
+        known.silences_ns = hello.heard.iter().map(silence_ns).collect();
         let ours = hello.heard.get(self.own).copied().unwrap_or_default();
         if let Some(exchange) =
             Exchange::of(ours.sent_ns, ours.came_ns, header.sent_ns, came_ns).filter(|_| ours.sent_ns > 0)
@@ -177,6 +219,16 @@ impl Peers {
             }
             known.next += 1;
         }
+        // A service is where the host says that it has moved to, and nobody else.
+        let mut has_moved = false;
+        for (place, said) in self.services.iter().zip(&hello.services) {
+            if place
+                .host_after(said.moves)
+                .is_some_and(|host| self.peers.get(host).is_some_and(|p| core::ptr::eq(p, peer)))
+            {
+                has_moved |= place.moves.fetch_max(said.moves, Ordering::AcqRel) < said.moves;
+            }
+        }
         let is_new =
             known.services.iter().map(|service| service.state).ne(hello.services.iter().map(|s| s.state));
         known.services = hello.services.to_vec();
@@ -186,7 +238,7 @@ impl Peers {
         if is_to_stop {
             self.stops.fetch_add(1, Ordering::AcqRel);
         }
-        Ok(is_new || is_new_link || is_to_stop)
+        Ok(is_new || is_new_link || is_to_stop || has_moved)
     }
 
     /// Which link speaks for a host; 0 if none has introduced itself.
@@ -196,13 +248,64 @@ impl Peers {
 
     /// How far a service elsewhere says it is, if its host has been heard.
     pub fn state_of(&self, service: ServiceId) -> Option<State> {
-        let index = self.services.iter().position(|(other, _)| *other == service)?;
-        let peer = &self.peers[self.services[index].1];
+        let index = self.services.iter().position(|place| place.service == service)?;
+        let peer = &self.peers[self.host_of(service)?];
         let code = peer.known().services.get(index)?.state;
         let states =
             [State::Absent, State::Retired, State::Starting, State::Wired, State::Ready, State::Running];
         let states = states.into_iter().chain([State::Done, State::Failed]);
         states.into_iter().find(|state| *state as u64 == code)
+    }
+
+    fn place_of(&self, service: ServiceId) -> Option<&Place> {
+        self.services.iter().find(|place| place.service == service)
+    }
+
+    /// The host on which a service is in charge.
+    pub fn host_of(&self, service: ServiceId) -> Option<usize> {
+        let place = self.place_of(service)?;
+        place.host_after(place.moves())
+    }
+
+    /// Whether a service is in charge on this host.
+    pub fn is_here(&self, service: ServiceId) -> bool {
+        self.host_of(service) == Some(self.own)
+    }
+
+    /// How often a service has moved.
+    pub fn moves_of(&self, service: ServiceId) -> u64 {
+        self.place_of(service).map_or(0, Place::moves)
+    }
+
+    /// It has moved so often, as is known from before.
+    pub fn recall_moves(&self, service: ServiceId, moves: u64) {
+        if let Some(place) = self.place_of(service) {
+            place.moves.fetch_max(moves, Ordering::AcqRel);
+        }
+    }
+
+    /// Has a service be in charge on this host, which is its next: from now on others are told so.
+    pub fn take_over(&self, service: ServiceId) {
+        if let Some(place) = self.place_of(service)
+            && let moves = place.moves() + 1
+            && place.host_after(moves) == Some(self.own)
+        {
+            place.moves.fetch_max(moves, Ordering::AcqRel);
+        }
+    }
+
+    /// Whether a host is lost: neither this one nor most of all have heard of it for long. Of a team that is cut in two
+    /// one part is the greater.
+    pub fn is_lost(&self, host: usize) -> bool {
+        let is_long = |silence: Duration| silence > LOST;
+        let testifies = |(other, peer): (usize, &Peer)| {
+            let is_fresh = self.silence_of(other).is_some_and(|silence| silence < TESTIMONY);
+            let silence_ns = peer.known().silences_ns.get(host).copied().flatten();
+            other != host && is_fresh && silence_ns.map(Duration::from_nanos).is_some_and(is_long)
+        };
+        let others = self.peers.iter().enumerate().filter(|(other, _)| *other != self.own);
+        let witnesses = 1 + others.filter(|other| testifies(*other)).count();
+        self.silence_of(host).is_some_and(is_long) && 2 * witnesses > self.peers.len()
     }
 
     /// For how long nothing has been heard of this host, if it ever was.

@@ -4,6 +4,7 @@ use crate::keys::Keys;
 use crate::latency::{Quantiles, fitting_delay_ticks};
 use crate::peers::{PeerReport, Peers};
 use crate::session::SessionError;
+use crate::standby::Kept;
 use crate::traffic::Source;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -39,6 +40,7 @@ struct Reported {
     period_s: f64,
     peers: Arc<Peers>,
     sources: Vec<Arc<Source>>,
+    kept: Vec<Arc<Kept>>,
     path: PathBuf,
     session: Session,
 }
@@ -51,9 +53,22 @@ struct Report<'a> {
     hosts: Vec<PeerReport<'a>>,
     /// What hosts have put under keys that are not theirs.
     refused_by_access_control: Option<u64>,
+    /// Services for which another host stands by, or this one.
+    standbys: Vec<StandbyReport<'a>>,
     topics: Vec<TopicReport<'a>>,
     /// Of the coordinator's commands to robots of this host.
     fitting_delay_ticks: Option<u64>,
+}
+
+#[derive(Serialize)]
+struct StandbyReport<'a> {
+    service: String,
+    /// On which host it is in charge, as far as is known here.
+    in_charge: Option<&'a str>,
+    moves: u64,
+    /// Of the checkpoint that came from the other host.
+    kept_tick: Option<u64>,
+    checkpoints: BTreeMap<&'static str, u64>,
 }
 
 #[derive(Serialize)]
@@ -87,7 +102,15 @@ impl Reported {
             .collect();
         let round_trips = topics.iter().filter_map(|topic| topic.round_trip);
         let fitting_delay_ticks = round_trips.map(|found| fitting_delay_ticks(&found, self.period_s)).max();
+        let of_standby = |kept: &Arc<Kept>| StandbyReport {
+            service: kept.service.to_string(),
+            in_charge: self.peers.host_of(kept.service).map(|host| &*self.names[host]),
+            moves: self.peers.moves_of(kept.service),
+            kept_tick: kept.next_tick.load(Ordering::Acquire).checked_sub(1),
+            checkpoints: kept.counters.snapshot(),
+        };
         Report {
+            standbys: self.kept.iter().map(of_standby).collect(),
             host: &self.host,
             incarnation: self.peers.incarnation(),
             tick: self.peers.tick(),
@@ -136,7 +159,7 @@ impl Reporter {
         session: &Session,
         keys: &Keys,
         peers: Arc<Peers>,
-        sources: &[Arc<Source>],
+        (sources, kept): (&[Arc<Source>], Vec<Arc<Kept>>),
     ) -> Result<Self, SessionError> {
         let names: Vec<_> = run.scenario.hosts.iter().map(|host| host.name.clone()).collect();
         let key = keys.hello(&names[host]);
@@ -155,6 +178,7 @@ impl Reporter {
             period_s: run.scenario.wall_period_s(),
             peers,
             sources: sources.to_vec(),
+            kept,
             path: directory.join(REPORT),
             session: session.clone(),
         });

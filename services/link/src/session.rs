@@ -1,17 +1,17 @@
 //! A session with all other hosts: by name, with certificates, and to say only what is one's own.
 
+use crate::checkpoint::MAX_CHECKPOINT_BYTES;
 use crate::keys::Keys;
 use core::fmt::Write as _;
 use mikoshi_config::RunSpec;
 use mikoshi_config::scenario::Host;
-use mikoshi_ipc_types::ServiceId;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use zenoh::{Config, Session, Wait as _};
 
-/// Largest message that is put together from parts: no frame is larger.
-const MAX_MESSAGE_BYTES: usize = 16 << 10;
+/// Largest message that is put together from parts: no frame is larger, and no checkpoint.
+const MAX_MESSAGE_BYTES: usize = MAX_CHECKPOINT_BYTES + (1 << 10);
 /// For how long a session is kept of whose other side nothing is heard. Shorter than that is a cut that it outlives.
 const LEASE_MS: u64 = 10_000;
 
@@ -121,11 +121,7 @@ impl Parts {
 /// he asks for of ours.
 fn access(run: &RunSpec, keys: &Keys, own: usize) -> Value {
     let scenario = &run.scenario;
-    let keys_of = |host: usize| {
-        let services = ServiceId::of_team(run.robots.len());
-        let there = services.filter(|service| scenario.host_of(*service) == Some(host));
-        keys.all_of(&scenario.hosts[host].name, there)
-    };
+    let keys_of = |host: usize| keys.all_of(host);
     let (mut rules, mut subjects, mut policies) = (vec![], vec![], vec![]);
     for (index, host) in scenario.hosts.iter().enumerate().filter(|(index, _)| *index != own) {
         let name = &host.name;

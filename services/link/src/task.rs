@@ -37,6 +37,22 @@ impl Task<'_> {
         clock.unwrap_or_default()
     }
 
+    /// Whether a service may be in charge on this host.
+    pub(crate) fn may_be_here(&self, service: ServiceId) -> bool {
+        self.run.scenario.places_of(service).any(|host| host == self.host)
+    }
+
+    /// The other of the two hosts of a service that has a standby, if this is one of them.
+    pub(crate) fn other_host_of(&self, service: ServiceId) -> Option<usize> {
+        let scenario = &self.run.scenario;
+        let (home, standby) = (scenario.host_of(service)?, scenario.standby_of(service)?);
+        match self.host {
+            host if host == home => Some(standby),
+            host if host == standby => Some(home),
+            _ => None,
+        }
+    }
+
     pub(crate) fn hosts_of_others(&self) -> impl Iterator<Item = usize> {
         let own = self.host;
         (0..self.run.scenario.hosts.len()).filter(move |host| *host != own)
@@ -47,7 +63,15 @@ impl Task<'_> {
         let clock = self.clock();
         let of_frames = self.crossings.iter().map(|crossing| (crossing.from_host, crossing.to_host));
         let of_clock = (0..self.run.scenario.hosts.len()).map(|host| (clock, host));
+        let scenario = &self.run.scenario;
+        let of_standbys = ServiceId::of_team(self.run.robots.len())
+            .filter_map(|service| Some((scenario.host_of(service)?, scenario.standby_of(service)?)));
         let ordered = |(one, other): (usize, usize)| (one.min(other), one.max(other));
-        of_frames.chain(of_clock).map(ordered).filter(|(one, other)| one != other).collect()
+        of_frames
+            .chain(of_clock)
+            .chain(of_standbys)
+            .map(ordered)
+            .filter(|(one, other)| one != other)
+            .collect()
     }
 }

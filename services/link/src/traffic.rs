@@ -4,6 +4,7 @@ use crate::gate::Counters;
 use crate::latency::{Latencies, SentTimes};
 use crate::peers::Peers;
 use crate::ports::{Inlet, Outlet};
+use crate::standby::Standby;
 use crate::task::Task;
 use core::sync::atomic::AtomicU64;
 use core::time::Duration;
@@ -28,6 +29,8 @@ const LOST: Duration = Duration::from_secs(10);
 /// What goes out.
 pub(crate) struct Outgoing {
     pub(crate) topic: Topic,
+    /// Whose it is.
+    pub(crate) service: ServiceId,
     pub(crate) outlet: Box<dyn Outlet>,
     pub(crate) destinations: Vec<Destination>,
     /// Whether its frames are the tick of the clock.
@@ -84,6 +87,8 @@ pub(crate) struct Traffic<'a> {
     pub(crate) stand_ins: Vec<(ServiceId, StandIn)>,
     pub(crate) outgoing: Vec<Outgoing>,
     pub(crate) incoming: Vec<Incoming>,
+    /// Services for which this host or another stands by.
+    pub(crate) standbys: Vec<Standby>,
     pub(crate) again: VecDeque<Again>,
     /// Where this host has the clock.
     pub(crate) beats: Option<Publisher<'static>>,
@@ -112,10 +117,11 @@ pub(crate) enum Turn {
 impl Traffic<'_> {
     /// Does all that is to be done; nothing if there was nothing.
     pub(crate) fn turn(&mut self, link: &IceoryxLink) -> Result<Option<Turn>, TickError> {
-        for (_, stand_in) in &self.stand_ins {
+        for (_, stand_in) in self.in_place() {
             stand_in.attend();
         }
-        let has_sent = self.send_out()? | self.send_again();
+        self.settle(link.board())?;
+        let has_sent = self.send_out(link.board())? | self.send_again();
         let has_said = self.begin_tick(link) | self.say()?;
         if self.follow(link)? {
             return Ok(Some(Turn::Last));
@@ -123,18 +129,47 @@ impl Traffic<'_> {
         Ok((has_sent || has_said).then_some(Turn::More))
     }
 
+    /// Those who hold the places of services elsewhere. A service that may move has one who waits, too.
+    pub(crate) fn in_place(&self) -> impl Iterator<Item = &(ServiceId, StandIn)> {
+        self.stand_ins.iter().filter(|(_, stand_in)| stand_in.is_in_place())
+    }
+
+    /// Settles who is in charge of what may move.
+    fn settle(&mut self, board: &Board) -> Result<(), TickError> {
+        let bridge = |(service, state)| (service == ServiceId::Bridge).then_some(state);
+        let world = match self.peers.is_here(ServiceId::Bridge) {
+            true => services_of(board).find_map(bridge),
+            false => self.peers.state_of(ServiceId::Bridge),
+        };
+        let goes_on = world.map(|state| state >= State::Running);
+        let is_by_the_clock = self.task.is_by_the_clock();
+        for standby in &mut self.standbys {
+            let stand_in = self.stand_ins.iter().find(|(service, _)| *service == standby.service);
+            let stand_in = stand_in.map(|(_, stand_in)| stand_in);
+            standby.settle(board, &self.peers, stand_in, goes_on, is_by_the_clock)?;
+        }
+        Ok(())
+    }
+
     /// Sends what services of this host have published.
-    fn send_out(&mut self) -> Result<bool, TickError> {
+    fn send_out(&mut self, board: &Board) -> Result<bool, TickError> {
         let link = &self.task.run.scenario.link;
         let repeats = if self.task.is_by_the_clock() { link.repeats } else { 0 };
         let repeats_of = |tick: u64| if tick == 0 && repeats > 0 { FIRST_REPEATS } else { repeats };
         let after_ns = u64::from(link.repeat_after_us) * 1000;
-        let Self { outgoing, peers, beats, again, sent, .. } = self;
+        let Self { outgoing, peers, beats, again, sent, standbys, .. } = self;
         let mut has_sent = false;
         let by_the_clock = self.task.is_by_the_clock();
         for (index, outgoing) in outgoing.iter_mut().enumerate() {
-            let Outgoing { outlet, destinations, is_beat, is_answered, .. } = outgoing;
+            let Outgoing { service, outlet, destinations, is_beat, is_answered, .. } = outgoing;
+            let is_here = peers.is_here(*service);
+            let mut has_said = false;
             let mut send = |tick: u64, frame: &[&[u8]]| {
+                if !is_here {
+                    // It was said on another host, and again in its place.
+                    return;
+                }
+                has_said = true;
                 let header = peers.header();
                 if *is_beat
                     && peers.reach(tick)
@@ -161,6 +196,10 @@ impl Traffic<'_> {
             };
             while outlet.take(&mut send)? {
                 has_sent = true;
+            }
+            if has_said {
+                let mut standbys = standbys.iter_mut().filter(|standby| standby.service == *service);
+                standbys.try_for_each(|standby| standby.send_kept(board, peers))?;
             }
         }
         Ok(has_sent)
@@ -224,6 +263,9 @@ impl Traffic<'_> {
         for Incoming { inlet, stand_in, phase, arrived } in &mut self.incoming {
             let (_, stand_in) = &self.stand_ins[*stand_in];
             while let Ok((tick, frame)) = arrived.try_recv() {
+                if !stand_in.is_in_place() {
+                    continue;
+                }
                 inlet.publish(tick, &frame)?;
                 if self.is_pacing && self.begun.is_none() {
                     // The clock begins with the world, and goes on by itself.
@@ -240,7 +282,7 @@ impl Traffic<'_> {
 
     /// For how long nothing was heard of the host of this service.
     fn silence_of(&self, service: ServiceId) -> Option<Duration> {
-        self.peers.silence_of(self.task.run.scenario.host_of(service)?)
+        self.peers.silence_of(self.peers.host_of(service)?)
     }
 
     /// Follows how far all are; whether the run has ended.
@@ -249,7 +291,7 @@ impl Traffic<'_> {
         if self.peers.stops() != self.stops {
             self.stops = self.peers.stops();
             // On the coordinator's host alone somebody hears it.
-            if self.stand_ins.iter().all(|(service, _)| *service != ServiceId::Coordinator) {
+            if self.peers.is_here(ServiceId::Coordinator) {
                 board.say(operator::STOP);
             }
         }
@@ -261,7 +303,7 @@ impl Traffic<'_> {
         }
         let is_by_the_clock = self.task.is_by_the_clock();
         let all_are_ready = all_are(State::Ready);
-        for (service, stand_in) in &self.stand_ins {
+        for (service, stand_in) in self.in_place() {
             let elsewhere = self.peers.state_of(*service);
             let is_lost = elsewhere == Some(State::Failed)
                 || self.silence_of(*service).is_some_and(|silence| silence > LOST);
@@ -279,13 +321,17 @@ impl Traffic<'_> {
                 _ => {}
             }
         }
-        let lives_here = |service: ServiceId| self.stand_ins.iter().all(|(other, _)| *other != service);
-        let mut own = services_of(board).filter(|(service, _)| lives_here(*service));
-        if !own.all(|(_, state)| state == State::Done) {
+        let lives_here = |service: ServiceId| self.in_place().all(|(other, _)| *other != service);
+        let own: Vec<_> = services_of(board).filter(|(service, _)| lives_here(*service)).collect();
+        if own.iter().any(|(_, state)| *state != State::Done) {
             return Ok(false);
         }
+        let all_have_ended = self.in_place().all(|(_, stand_in)| stand_in.state() == State::Done);
+        if own.is_empty() {
+            // Who lived here has moved: nobody but the others says when all is over.
+            return Ok(all_have_ended);
+        }
         let since_ns = *self.since_done_ns.get_or_insert_with(now_ns);
-        let all_have_ended = self.stand_ins.iter().all(|(_, stand_in)| stand_in.state() == State::Done);
         Ok(all_have_ended || u128::from(now_ns().saturating_sub(since_ns)) > LAST_WORDS.as_nanos())
     }
 }

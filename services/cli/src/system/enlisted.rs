@@ -60,7 +60,7 @@ pub fn generate(folder: &Path) -> Result<(), Failure> {
 /// All units of this scenario; where there is hardware its bridge, which bears the first robot's name, comes in place
 /// of the simulated world. On one host of several, those of its services, and the link.
 fn enlisted(scenario: &Scenario, has_hardware: bool, host: Option<usize>) -> Vec<Enlisted> {
-    let is_here = |service| host.is_none() || scenario.host_of(service) == host;
+    let is_here = |service| host.is_none_or(|host| scenario.places_of(service).any(|place| place == host));
     let placement = |service| placement_text(scenario, service);
     let robots: Vec<_> = scenario.robots.iter().map(|robot| instance(&robot.name)).enumerate().collect();
     let hardware = robots.first().filter(|_| has_hardware);

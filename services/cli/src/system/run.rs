@@ -7,6 +7,7 @@ use crate::prepare::prepare_paced;
 use crate::wall_clock::pause;
 use core::time::Duration;
 use mikoshi_config::Scenario;
+use mikoshi_ipc_types::ServiceId;
 use mikoshi_resolution::{services_on_board, write_run};
 use mikoshi_runtime::{Board, Clock, Domain, Role, RunDirectory, State, required_bytes};
 use std::path::PathBuf;
@@ -28,7 +29,9 @@ pub fn prepare(arguments: &PrepareArguments) -> Result<(), Failure> {
     let board = match host {
         Some(host) => {
             let services = services_on_board(&prepared.run, &prepared.schedule, host);
-            Board::create_for_host(directory.path(), &services)
+            let has_standby = |service: &ServiceId| prepared.run.scenario.standby_of(*service).is_some();
+            let reserved: Vec<_> = services.iter().copied().filter(has_standby).collect();
+            Board::create_for_host(directory.path(), &services, &reserved)
         }
         None => Board::create(directory.path(), &prepared.schedule.services(), false),
     };

@@ -30,12 +30,23 @@ pub struct Cluster {
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 impl Host {
-    /// Starts one whose clock is ahead of this machine's by so much.
-    fn start(name: &str, clock_ahead_s: u32) -> Result<Self, Lacking> {
+    /// Starts one whose clock is ahead of this machine's by so much; with the cable of another one, if there is one.
+    fn start(name: &str, clock_ahead_s: u32, cable: Option<&Self>) -> Result<Self, Lacking> {
         let script = "mount -t tmpfs -o size=256M none /dev/shm && mount -t tmpfs none /run && hostname \"$0\" && \
                       ip link set lo up && echo $$ && exec cat";
-        let mut command = Command::new("unshare");
-        command.args(["--mount", "--net", "--uts", "--ipc", "--time", "--propagation", "private"]);
+        let mut command = match cable {
+            Some(other) => {
+                let mut command = Command::new("nsenter");
+                command.arg(format!("--target={}", other.pid)).args(["--net", "--", "unshare"]);
+                command
+            }
+            None => {
+                let mut command = Command::new("unshare");
+                command.arg("--net");
+                command
+            }
+        };
+        command.args(["--mount", "--uts", "--ipc", "--time", "--propagation", "private"]);
         command.arg(format!("--monotonic={clock_ahead_s}"));
         command.args(["--fork", "--kill-child", "sh", "-c", script, name]);
         let spawned = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
@@ -104,7 +115,7 @@ impl Cluster {
         let mut hosts = Vec::new();
         let mut interfaces = Vec::new();
         for (index, name) in names.iter().enumerate() {
-            let host = Host::start(name, 1000 * index as u32)?;
+            let host = Host::start(name, 1000 * index as u32, None)?;
             let number = NUMBER.fetch_add(1, Ordering::Relaxed);
             let own = format!("mk{}x{number}", std::process::id());
             interfaces.push(interface(&own).map_err(|error| Lacking(format!("/dev/net/tun: {error}")))?);
@@ -112,6 +123,13 @@ impl Cluster {
             hosts.push(host);
         }
         Ok(Self { hosts, wire: Wire::between(interfaces) })
+    }
+
+    /// Another machine in the place of a host, at its cable: nothing that was there is there.
+    pub fn replace(&mut self, name: &str) {
+        let index = self.index_of(name);
+        let other = Host::start(name, 5000, Some(&self.hosts[index])).expect("the first one could be had");
+        self.hosts[index] = other;
     }
 
     /// The index of the host of this name.

@@ -8,6 +8,7 @@ mod attacks;
 mod cuts;
 mod hosts;
 mod lockstep;
+mod replaced;
 mod team;
 mod walk;
 mod ways;

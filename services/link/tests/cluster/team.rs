@@ -1,6 +1,8 @@
 //! A team on several hosts: its scenario, its certificates, its processes.
 
 use crate::hosts::{Cluster, Host, Lacking};
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::{Role, State};
 use serde_json::Value;
 use std::env;
 use std::fs;
@@ -33,11 +35,24 @@ pub struct Plan {
     pub robots: Vec<String>,
     overrides: Vec<String>,
     is_lockstep: bool,
+    /// Of whom which host stands by for whom.
+    standbys: Vec<(String, String)>,
 }
 
 impl Plan {
     /// This scenario of the project's, by a team of this many robots on as many hosts and two more.
     pub fn of(scenario: &str, robots: &[&str], overrides: &[&str], is_lockstep: bool) -> Self {
+        Self::with_standbys(scenario, robots, overrides, is_lockstep, &[])
+    }
+
+    /// The same, with hosts that stand by for services of others.
+    pub fn with_standbys(
+        scenario: &str,
+        robots: &[&str],
+        overrides: &[&str],
+        is_lockstep: bool,
+        standbys: &[(&str, &str)],
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let config = workspace().join("config").canonicalize().expect("it is there");
         for name in ["teams", "robots"] {
@@ -50,8 +65,11 @@ impl Plan {
             text.lines().find(|line| line.starts_with("team = ")).expect("it has a team").to_owned();
         text = text.replacen(&of_team, &format!("team = \"{team}\""), 1);
         let mut host = |name: &str, service: &str, number: usize| {
+            let of_host: Vec<_> =
+                standbys.iter().filter(|(host, _)| *host == name).map(|(_, service)| service).collect();
             text += &format!(
-                "\n[[hosts]]\nname = \"{name}\"\nservices = [\"{service}\"]\nlisten = \"10.77.0.{number}:7447\"\n"
+                "\n[[hosts]]\nname = \"{name}\"\nservices = [\"{service}\"]\nlisten = \"10.77.0.{number}:7447\"\n\
+                 standbys = {of_host:?}\n"
             );
         };
         host(STAGE, "bridge", 1);
@@ -64,6 +82,7 @@ impl Plan {
             robots: robots.iter().map(|robot| (*robot).to_owned()).collect(),
             overrides: overrides.iter().map(|set| (*set).to_owned()).collect(),
             is_lockstep,
+            standbys: standbys.iter().map(|(host, of)| ((*host).to_owned(), (*of).to_owned())).collect(),
         };
         fs::write(plan.scenario(), text).expect("it is writable");
         plan.certify(&[]);
@@ -177,6 +196,14 @@ impl<'p> Team<'p> {
     /// Starts the link and the services of a host.
     pub fn start_services(&mut self, host: &str) {
         self.start_link(host);
+        self.start_service(host);
+        let stands_by = |(on, of): &(String, String)| on == host && of == "coordinator";
+        if self.plan.standbys.iter().any(stands_by) {
+            self.start_program(host, "mikoshi-coordinator", &[]);
+        }
+    }
+
+    fn start_service(&mut self, host: &str) {
         let (name, arguments): (_, Vec<&str>) = match host {
             STAGE => ("mikoshi-bridge", vec![]),
             HEAD => ("mikoshi-coordinator", vec![]),
@@ -186,10 +213,56 @@ impl<'p> Team<'p> {
                 ("mikoshi-servo", vec!["--robot", robot.as_str()])
             }
         };
+        self.start_program(host, name, &arguments);
+    }
+
+    fn start_program(&mut self, host: &str, name: &'static str, arguments: &[&str]) {
         let mut command = self.host(host).command(&program(name));
         command.args(["--run", RUN, "--enlist"]).args(arguments);
         let child = self.spawn(command, name);
         self.processes.push((host.to_owned(), name, child));
+    }
+
+    /// Puts another machine in the place of a host, and starts what runs there.
+    pub fn replace(&mut self, host: &str) {
+        for name in ["mikoshi-link", "mikoshi-servo", "mikoshi-coordinator"] {
+            self.kill(host, name);
+        }
+        self.cluster.replace(host);
+        self.prepare(host);
+        self.start_services(host);
+    }
+
+    /// Sends this signal to all processes of a host.
+    pub fn signal(&self, host: &str, signal: libc::c_int) {
+        for (_, _, child) in self.processes.iter().filter(|(on, _, _)| on == host) {
+            // SAFETY: it is a process of ours, which nobody has waited for.
+            unsafe { libc::kill(child.id() as libc::pid_t, signal) };
+        }
+    }
+
+    /// Waits for the end of what is called so on a host, and returns its status.
+    pub fn wait_for_end(&mut self, host: &str, name: &str) -> Option<i32> {
+        let of = |(on, what, _): &&mut (String, &str, Child)| on == host && *what == name;
+        let (_, _, child) = self.processes.iter_mut().find(of).expect("it was started");
+        child.wait().expect("it was started").code()
+    }
+
+    /// How far a service is, by the board of a host.
+    pub fn state(&self, host: &str, service: ServiceId) -> (State, u64) {
+        let board = mikoshi_runtime::Board::open(&self.host(host).file(RUN)).expect("it is there");
+        let state = board.states().find(|(role, _)| *role == Role::Service(service));
+        (
+            state.map_or(State::Absent, |(_, state)| state),
+            board.last_position(service).unwrap_or_default().tick,
+        )
+    }
+
+    /// What a host's link says of a service that has a standby.
+    pub fn standby(&self, host: &str, service: &str) -> Value {
+        let report = self.report(host);
+        let standbys = report["standbys"].as_array().expect("a list").clone();
+        standbys.into_iter().find(|standby| standby["service"] == service).unwrap_or(Value::Null)
     }
 
     /// Starts the link of a host.

@@ -19,10 +19,15 @@ pub const WALK: [&str; 8] = [
 
 /// A plan for that, by commands of this age and this loop gain.
 pub fn walk(delay_ticks: u64, loop_gain: f64, more: &[&str]) -> Plan {
+    walk_with(delay_ticks, loop_gain, more, &[])
+}
+
+/// The same, with hosts that stand by for services of others.
+pub fn walk_with(delay_ticks: u64, loop_gain: f64, more: &[&str], standbys: &[(&str, &str)]) -> Plan {
     let delay = format!("coordination_delay_ticks={delay_ticks}");
     let gain = format!("hybrid.loop_gain={loop_gain}");
     let settings = [&WALK[..], &[&delay, &gain], more].concat();
-    Plan::of("service.toml", &["A", "B"], &settings, false)
+    Plan::with_standbys("service.toml", &["A", "B"], &settings, false, standbys)
 }
 
 /// Says what a link has measured, for the reader of the test.

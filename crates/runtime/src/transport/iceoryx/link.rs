@@ -3,12 +3,14 @@
 use super::calls::Source;
 use super::{IceoryxTransport, OpenError, Process};
 use crate::board::{Board, Doorbell, Role, State};
+use crate::checkpoint;
 use crate::member::{Entry, JoinError, Member};
 use crate::pace::now_ns;
 use crate::transport::accept::{Verdict, judge};
 use crate::transport::{ConnectError, consumer_depth};
 use crate::wait::WaitPolicy;
 use crate::{Clock, Position, TickError, TickSchedule, Topic};
+use core::cell::Cell;
 use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriberPort;
 use iceoryx2::prelude::ipc;
 use mikoshi_ipc_types::{Frame, Payload, ServiceId};
@@ -184,6 +186,8 @@ impl<P: Payload> Outlet<P> {
 /// The place of a service that lives on another host. Its words come over the network.
 pub struct StandIn {
     transport: IceoryxTransport,
+    /// Whether it has made room for a process of this host.
+    has_left: Cell<bool>,
 }
 
 impl StandIn {
@@ -201,7 +205,47 @@ impl StandIn {
         if member.is_successor() {
             member.take_charge(member.slot().position(), None)?;
         }
-        Ok(Self { transport: IceoryxTransport::open(run, member, schedule)? })
+        Ok(Self { transport: IceoryxTransport::open(run, member, schedule)?, has_left: Cell::new(false) })
+    }
+
+    /// Makes ready to take the place of this service, which may come to live on another host: another has it.
+    ///
+    /// # Errors
+    /// iceoryx2 can't be used.
+    pub fn prepare(
+        run: &Path,
+        service: ServiceId,
+        policy: WaitPolicy,
+        schedule: &TickSchedule,
+    ) -> Result<Self, LinkError> {
+        let member = Member::join(run, Role::Service(service), policy, Entry::Standby)?;
+        Ok(Self { transport: IceoryxTransport::open(run, member, schedule)?, has_left: Cell::new(false) })
+    }
+
+    /// Whether it has the place.
+    pub fn is_in_place(&self) -> bool {
+        let member = &self.transport.process.member;
+        !self.has_left.get() && member.epoch() > 0 && member.is_in_charge()
+    }
+
+    /// Takes the place from whoever of this host has it, since the service is on another one now: a process that
+    /// comes too late finds itself fenced, and what it kept is nobody's.
+    ///
+    /// # Errors
+    /// Another process was first.
+    pub fn seize(&self) -> Result<(), LinkError> {
+        let process = &self.transport.process;
+        process.member.seize()?;
+        checkpoint::discard(&process.run, self.transport.service).map_err(JoinError::Proc)?;
+        self.has_left.set(false);
+        self.enter(State::Wired);
+        Ok(())
+    }
+
+    /// Leaves the place to the process of this host that stands by for it.
+    pub fn make_room(&self) {
+        self.has_left.set(true);
+        self.transport.process.member.vacate();
     }
 
     /// By which it publishes what came.

@@ -1,0 +1,122 @@
+//! Hosts that are lost for good, and who goes on in their place.
+
+use crate::or_skip;
+use crate::team::{HEAD, STAGE, Team, program, robot_host};
+use crate::walk::{tell, walk_with};
+use crate::wire::Way;
+use mikoshi_ipc_types::ServiceId;
+use mikoshi_runtime::State;
+use serde_json::Value;
+use std::process::{Command, Stdio};
+
+/// Ticks in which what must happen has long happened.
+const AMPLE_TICKS: u64 = 3000;
+
+/// What a summary says of stops, by robot where it is one's.
+fn faults(summary: &Value) -> Vec<&str> {
+    let faults = summary["faults"].as_array().expect("a list");
+    faults.iter().map(|fault| fault["code"].as_str().unwrap_or_default()).collect()
+}
+
+/// Lets the team go on, and stops it: it stops only if it had gone on.
+fn goes_on_and_stops(team: &mut Team<'_>, operator: &str) {
+    team.host(operator).run(&program("mikoshi"), &["resume"]);
+    let resumed = team.tick(STAGE);
+    team.wait_for_tick(resumed + 600);
+    team.host(operator).run(&program("mikoshi"), &["stop"]);
+}
+
+/// Waits until a service executes ticks on a host, and is in the present one.
+fn wait_until_it_goes(team: &Team<'_>, host: &str, service: ServiceId) {
+    let goes = || {
+        let (state, tick) = team.state(host, service);
+        state == State::Running && tick + 8 > team.tick(host)
+    };
+    team.wait_until(AMPLE_TICKS, goes);
+    assert!(
+        goes(),
+        "{service} on {host}: {:?} of {}\n{}",
+        team.state(host, service),
+        team.tick(host),
+        team.words()
+    );
+}
+
+/// What the old host of the coordinator would say to robot B, with its own certificate.
+fn says_late(team: &Team<'_>, certificates: &std::path::Path) -> Value {
+    let incarnation = team.report(HEAD)["incarnation"].to_string();
+    let mut hostile: Command = team.host(HEAD).command(&program("examples/hostile"));
+    hostile.arg("--certificates").arg(certificates).args(["--host", HEAD, "--connect", "10.77.0.4:7447"]);
+    hostile.args(["--key", "mikoshi/service/coordinator/B/team-command/robot-b", "--kind", "replay"]);
+    hostile.args(["--run", crate::team::RUN, "--robot", "1", "--incarnation", &incarnation]);
+    let said = hostile.stderr(Stdio::null()).output().expect("it can be started");
+    serde_json::from_slice(&said.stdout).expect("it says what it did")
+}
+
+#[test]
+fn a_coordinator_whose_host_is_lost_has_a_successor_on_another_and_the_old_one_is_refused() {
+    let (a, b) = (robot_host("A"), robot_host("B"));
+    let plan = walk_with(2, 0.06, &["duration_s=45", "motion.random.duration_s=40"], &[(&a, "coordinator")]);
+    let mut team = or_skip!(Team::gather(&plan));
+    let head = team.cluster.index_of(HEAD);
+    team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(2.0));
+    team.start();
+    team.wait_for_tick(1300);
+    // It is not dead, only of no use: whether it comes back nobody knows.
+    team.signal(HEAD, libc::SIGSTOP);
+    wait_until_it_goes(&team, &a, ServiceId::Coordinator);
+    let lost_ticks = team.tick(STAGE) - 1300;
+    team.signal(HEAD, libc::SIGCONT);
+    let status = team.wait_for_end(HEAD, "mikoshi-coordinator");
+    eprintln!("in charge again after {lost_ticks} ticks; the old one ended with {status:?}");
+    assert_eq!(status, Some(75), "it finds itself fenced");
+    let refused = || {
+        let report = team.report(&b);
+        let topics = report["topics"].as_array().expect("a list").clone();
+        let of_head =
+            topics.iter().find(|topic| topic["topic"] == "team-command[1]" && topic["from"] == HEAD);
+        of_head.expect("it may come")["frames"]["epoch"].as_u64().unwrap_or(0)
+    };
+    let before = refused();
+    let said = says_late(&team, &plan.certificates());
+    let sent = said["sent"].as_u64().expect("a number");
+    team.wait_until(AMPLE_TICKS, || refused() - before > sent / 2);
+    eprintln!("{said}: {} refused by epoch", refused() - before);
+    assert!(sent > 0 && refused() - before > sent / 2);
+    goes_on_and_stops(&mut team, &a);
+    for host in [STAGE, HEAD, &a, &b] {
+        tell(&team, host);
+        let coordinator = team.standby(host, "coordinator");
+        eprintln!("{host}: {coordinator}");
+        assert!(coordinator == Value::Null || coordinator["in_charge"] == a);
+    }
+    let summary = team.finish();
+    eprintln!("{} {}", summary["faults"], summary["object"]);
+    assert_eq!(summary["fell"], Value::Array(vec![]));
+    assert_eq!(faults(&summary), ["input-stale", "operator-stop"], "it stopped, went on, and stopped");
+}
+
+#[test]
+fn a_machine_in_the_place_of_a_robots_goes_on_from_what_was_kept_elsewhere() {
+    let b = robot_host("B");
+    let plan = walk_with(2, 0.06, &["duration_s=45", "motion.random.duration_s=40"], &[(HEAD, "B")]);
+    let mut team = or_skip!(Team::gather(&plan));
+    let head = team.cluster.index_of(HEAD);
+    team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(2.0));
+    team.start();
+    team.wait_for_tick(1300);
+    team.replace(&b);
+    wait_until_it_goes(&team, &b, ServiceId::Servo(1));
+    let (since, now) = (team.standby(&b, "servo-1"), team.tick(STAGE));
+    eprintln!("back in tick {now}: {since}");
+    // It stands with the others.
+    team.wait_for_tick(now + 600);
+    goes_on_and_stops(&mut team, HEAD);
+    for host in [STAGE, HEAD, &b] {
+        tell(&team, host);
+    }
+    let summary = team.finish();
+    eprintln!("{} {}", summary["faults"], summary["object"]);
+    assert_eq!(summary["fell"], Value::Array(vec![]));
+    assert_eq!(faults(&summary), ["input-stale", "operator-stop"], "it stopped, went on, and stopped");
+}
