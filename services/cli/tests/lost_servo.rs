@@ -267,6 +267,33 @@ fn a_servo_that_comes_back_while_its_plan_is_played_takes_over_and_the_team_goes
     }
 }
 
+/// Whether a frame is one that robot `robot`'s servo says or hears.
+fn concerns_servo(topic: Topic, robot: usize) -> bool {
+    is_of_servo(topic, robot)
+        || topic == Topic::of::<Sensors>(robot)
+        || topic == Topic::of::<TeamCommand>(robot)
+}
+
+/// What becomes of two robots of which one is cut off while they walk, for this many ticks, and who go on later.
+fn cut_off(lost: usize, eighth: u64, ticks: u64) -> Fate {
+    let run = walk("two", 0.1, "0.5", "[{ at_s = 8.5, says = \"resume\" }]");
+    let from = WALKING + eighth * STEP / 8;
+    let silent = from..from + ticks;
+    fate(&run, lost, from, move |topic, tick| silent.contains(&tick) && concerns_servo(topic, lost))
+}
+
+#[test]
+fn a_servo_that_was_cut_off_until_its_plan_was_over_begins_anew_where_its_robot_stands() {
+    for eighth in 0..8 {
+        let lost = eighth as usize % 2;
+        let fate = cut_off(lost, eighth, 600);
+        eprintln!("{eighth}: {fate:?}");
+        assert!(fate.stop.is_some() && !fate.stopped_in_the_end, "{fate:?}");
+        assert!(fate.fell == 0 && fate.tilt_max_rad < 0.1 && fate.sunk_m < 0.03, "{fate:?}");
+        assert!(fate.margin_min_m > 0.0, "{fate:?}");
+    }
+}
+
 /// Prints what becomes of teams that lose a servo in each of eight phases.
 #[test]
 #[ignore = "a table, not a test"]

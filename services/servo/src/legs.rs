@@ -10,7 +10,7 @@ use mikoshi_humanoid::balance::{
 };
 use mikoshi_humanoid::estimate::FootContact;
 use mikoshi_humanoid::gait::{
-    FootPlacement, Gait, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose, HandCentre,
+    FootPlacement, Foothold, Gait, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose, HandCentre,
     PreviewConfig, SoleCorrection, SoleTracking, StepClock, StepTiming, StepWish, SwingConfig, wrap,
 };
 use mikoshi_ipc_types::MAX_HANDS;
@@ -162,6 +162,34 @@ impl Legs {
             waist_over_feet: yawed(-mean_yaw(&on_ground)) * waist.rotation,
         };
         Ok((legs, state))
+    }
+
+    /// Of a robot that was found to stand on these feet, after what was known in `before`: how its feet belong under its
+    /// hands it still knows.
+    pub(crate) fn stand_anew(
+        &self,
+        before: &LegsState,
+        feet: &PerFoot<Pose<World, Foot>>,
+        com: Vector2<f64>,
+        X_WB: &Pose<World, Base>,
+    ) -> LegsState {
+        let mut gait = self.gait.standing(PerFoot::from_fn(|side| GroundPose::of(&feet[side])), com);
+        gait.placement = before.gait.placement;
+        let tolerance_m = self.gait.config().swing.plane_tolerance_m;
+        for side in Side::BOTH {
+            let foot = Foothold { height: feet[side].translation.z, ..gait.feet[side] };
+            gait.feet[side] = foot.on_plane_within(tolerance_m);
+        }
+        LegsState {
+            gait,
+            stabiliser: StabiliserState::default(),
+            sole_correction: PerFoot { right: Twist::zero(), left: Twist::zero() },
+            ground_tilt: PerFoot { right: Vector3::zeros(), left: Vector3::zeros() },
+            trust: PerFoot { right: 1.0, left: 1.0 },
+            base_commanded: *X_WB,
+            hand_centre: None,
+            steps: before.steps,
+        }
     }
 
     /// Which feet say where the base is: those that stand, by the phase of the gait and not by force,

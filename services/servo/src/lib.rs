@@ -8,6 +8,7 @@
 
 #![allow(non_snake_case)]
 
+mod anew;
 mod coast;
 mod credible;
 mod fallback;

@@ -51,6 +51,10 @@ struct Heard {
     next_usable_tick: u64,
     /// What the robot says of it in its next state: bits of [`flag`].
     flags: u64,
+    /// 1 if the sensors of this tick can be believed.
+    has_sensors: u64,
+    /// 1 since drives were found to have gone on without their servo, until it has begun anew.
+    is_adrift: u64,
     /// How hands go on where nothing is heard.
     course: Course,
 }
@@ -89,6 +93,16 @@ impl<T: Transport> ServoParticipant<T> {
         let received = self.sensor_port.receive(tick, &mut self.sensors);
         let sensors = &self.sensors.payload;
         let has_arrived = has_arrived(&received);
+        self.heard.has_sensors = u64::from(received.is_ok() && self.servo.believes(sensors));
+        if self.heard.has_sensors != 0 && Servo::is_adrift(tick, sensors) {
+            self.heard.is_adrift = 1;
+        }
+        if self.heard.is_adrift != 0 {
+            // What it could say of its robot is not so: as if it had no sensors.
+            self.servo.sense_nothing(&mut self.state, &mut self.robot_state);
+            self.robot_state.flags |= flags | flag::INPUT_MISSING;
+            return Ok(());
+        }
         let next_sensors_tick = if has_arrived { tick + 1 } else { self.robot_state.next_sensors_tick };
         match received {
             Ok(()) if self.servo.believes(sensors) => {
@@ -117,6 +131,9 @@ impl<T: Transport> ServoParticipant<T> {
         if let Some(command_tick) = tick.checked_sub(self.coordination_delay_ticks) {
             self.hear(command_tick)?;
         }
+        if self.heard.is_adrift != 0 {
+            self.find_robot(tick);
+        }
         let command = (self.heard.next_usable_tick > 0).then_some(&self.command);
         self.joint_command = JointCommand::zeroed();
         self.servo
@@ -124,6 +141,18 @@ impl<T: Transport> ServoParticipant<T> {
             .map_err(|error| TickError::Service(error.text()))?;
         self.joint_command.next_team_command_tick = self.heard.next_tick;
         Ok(())
+    }
+
+    /// Begins anew where the robot is, once it stands and the team says where it wants its hands.
+    fn find_robot(&mut self, tick: u64) {
+        let is_told = self.heard.next_usable_tick + self.coordination_delay_ticks == tick + 1;
+        let sensors = &self.sensors.payload;
+        let can_be_found = is_told && self.heard.has_sensors != 0 && self.servo.stands_still(sensors);
+        if can_be_found
+            && self.servo.begin_anew(&mut self.state, &mut self.scratch, sensors, &self.command).is_ok()
+        {
+            self.heard.is_adrift = 0;
+        }
     }
 
     /// Hears the command of this tick. Where it can't be used or does not come, the last one is led on; the
@@ -182,6 +211,8 @@ impl<T: Transport> Participant for ServoParticipant<T> {
     fn publish(&mut self, call: Call, tick: u64) -> Result<(), TickError> {
         match call {
             Call::Sense => self.state_port.send(tick, &self.robot_state),
+            // Drives go on with their plan, which knows better where they are.
+            Call::Act if self.heard.is_adrift != 0 => Ok(()),
             Call::Act => self.joint_port.send(tick, &self.joint_command),
             _ => Err(TickError::UnknownCall),
         }

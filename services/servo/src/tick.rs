@@ -39,41 +39,41 @@ const HAND_TOLERANCE_M: f64 = 0.005;
 /// One robot's controller. Immutable.
 #[derive(Clone, Debug)]
 pub struct Servo {
-    robot: Robot,
-    legs: Legs,
-    fallback: Fallback,
+    pub(crate) robot: Robot,
+    pub(crate) legs: Legs,
+    pub(crate) fallback: Fallback,
     period_s: f64,
     initial: ServoState,
 }
 
 /// Of [`ServoState`]'s layout: another one gets another number, so that no servo goes on from a state that it
 /// would misread.
-pub(crate) const STATE_VERSION: u64 = 9;
+pub(crate) const STATE_VERSION: u64 = 10;
 
 /// All that matters between ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ServoState {
-    ik: IkState,
-    base: BaseEstimatorState,
-    legs: LegsState,
+    pub(crate) ik: IkState,
+    pub(crate) base: BaseEstimatorState,
+    pub(crate) legs: LegsState,
     /// What the robot feels; nothing while its sensors can't be believed.
-    felt: Option<Felt>,
-    hand_pose_commanded: [PoseWire; MAX_HANDS],
-    hand_error_max_m: f64,
-    joint_margin_rad: f64,
-    flags: u64,
+    pub(crate) felt: Option<Felt>,
+    pub(crate) hand_pose_commanded: [PoseWire; MAX_HANDS],
+    pub(crate) hand_error_max_m: f64,
+    pub(crate) joint_margin_rad: f64,
+    pub(crate) flags: u64,
     /// Of the last command: bit h for grasping hand h.
-    closed_hands: u64,
-    fallback: FallbackState,
-    burden: Burden,
+    pub(crate) closed_hands: u64,
+    pub(crate) fallback: FallbackState,
+    pub(crate) burden: Burden,
     /// Part of the object's speed that drives leave, 0 to 1: less where they are at their limits while the robot walks.
-    ease: f64,
+    pub(crate) ease: f64,
 }
 
 /// Workspaces: filled with NaN between ticks they change nothing.
 #[derive(Clone, Debug)]
 pub struct ServoScratch {
-    measured: Kinematics,
+    pub(crate) measured: Kinematics,
     ik: IkScratch,
 }
 
@@ -85,6 +85,7 @@ pub enum ServoError {
     HandReference,
     StepClock,
     InverseKinematics,
+    Upside,
 }
 
 impl ServoError {
@@ -93,6 +94,7 @@ impl ServoError {
         match self {
             Self::HandReference => "a hand reference is not a pose",
             Self::StepClock => "the team's step clock is none",
+            Self::Upside => "the robot does not stand upright",
             Self::InverseKinematics => "the inverse kinematics rejects its inputs",
         }
     }
