@@ -70,3 +70,28 @@ fn what_is_wrong_with_hosts_is_said_by_key() {
         assert!(error.contains(key), "{error}");
     }
 }
+
+#[test]
+fn a_host_stands_by_for_services_of_others() {
+    let with = |standbys: [&str; 2], more: &[(&str, &str)]| {
+        let host = |host: &str, standbys: &str| host.replace(" }", &format!(", standbys = [{standbys}] }}"));
+        load(&[&host(STAGE, standbys[0]), &host(ROBOTS, standbys[1])], more)
+    };
+    let scenario = with([r#""A""#, r#""coordinator""#], &[]).expect("it is right").scenario;
+    let standbys = ServiceId::of_team(2).map(|service| scenario.standby_of(service)).collect::<Vec<_>>();
+    assert_eq!(standbys, [None, Some(0), None, Some(1)]);
+    let places = |service| scenario.places_of(service).collect::<Vec<_>>();
+    assert_eq!(places(ServiceId::Coordinator), [0, 1]);
+    assert_eq!(places(ServiceId::Servo(0)), [1], "a servo is where its robot is");
+    for (standbys, key, problem) in [
+        ([r#""bridge""#, ""], "hosts.0.standbys.0", "nothing stands by for the world"),
+        ([r#""C""#, ""], "hosts.0.standbys.0", "the coordinator, or a robot"),
+        ([r#""coordinator""#, ""], "hosts.0.standbys.0", "which runs there"),
+        ([r#""A", "A""#, ""], "hosts.0.standbys.1", "one standby for each"),
+    ] {
+        let error = with(standbys, &[]).expect_err("it is refused").to_string();
+        assert!(error.contains(key) && error.contains(problem), "{error} lacks {key} or {problem}");
+    }
+    let clock = with(["", r#""coordinator""#], &[("link.clock", "stage")]).expect_err("it would stand still");
+    assert!(clock.to_string().contains("link.clock"), "{clock}");
+}

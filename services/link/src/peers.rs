@@ -171,12 +171,13 @@ impl Peers {
     /// Hears what another host says of itself; whether it says anything new.
     pub fn hear(&self, host: usize, message: &[u8]) -> bool {
         let peer = &self.peers[host];
-        let heard = self.try_hear(peer, message);
+        let heard = self.try_hear(host, message);
         peer.counters.count(&heard);
         heard.unwrap_or(false)
     }
 
-    fn try_hear(&self, peer: &Peer, message: &[u8]) -> Result<bool, Refusal> {
+    fn try_hear(&self, host: usize, message: &[u8]) -> Result<bool, Refusal> {
+        let peer = &self.peers[host];
         let came_ns = now_ns();
         let (header, body) = Header::split(message).ok_or(Refusal::Malformed)?;
         let hello: Hello = bytemuck::try_pod_read_unaligned(body).map_err(|_| Refusal::Malformed)?;
@@ -186,6 +187,17 @@ impl Peers {
         }
         if hello.services.iter().any(|service| service.moves > MOST_MOVES) {
             return Err(Refusal::Malformed);
+        }
+        if header.incarnation < peer.incarnation.load(Ordering::Acquire) {
+            return Err(Refusal::Incarnation);
+        }
+        // A service is where the host says that it has moved to, and nobody else. This is known before anything else
+        // is heard of that host.
+        let mut has_moved = false;
+        for (place, said) in self.services.iter().zip(&hello.services) {
+            if place.host_after(said.moves) == Some(host) {
+                has_moved |= place.moves.fetch_max(said.moves, Ordering::AcqRel) < said.moves;
+            }
         }
         // A link that was started anew has a larger number than its predecessor.
         let last = peer.incarnation.fetch_max(header.incarnation, Ordering::AcqRel);
@@ -218,16 +230,6 @@ impl Peers {
                 None => known.exchanges.push(exchange),
             }
             known.next += 1;
-        }
-        // A service is where the host says that it has moved to, and nobody else.
-        let mut has_moved = false;
-        for (place, said) in self.services.iter().zip(&hello.services) {
-            if place
-                .host_after(said.moves)
-                .is_some_and(|host| self.peers.get(host).is_some_and(|p| core::ptr::eq(p, peer)))
-            {
-                has_moved |= place.moves.fetch_max(said.moves, Ordering::AcqRel) < said.moves;
-            }
         }
         let is_new =
             known.services.iter().map(|service| service.state).ne(hello.services.iter().map(|s| s.state));
@@ -419,7 +421,7 @@ mod tests {
     }
 
     fn board(folder: &Path) -> Board {
-        Board::create_for_host(folder, &ServiceId::of_team(2).collect::<Vec<_>>()).expect("a board")
+        Board::create_for_host(folder, &ServiceId::of_team(2).collect::<Vec<_>>(), &[]).expect("a board")
     }
 
     #[test]
@@ -472,5 +474,89 @@ mod tests {
         assert!(stage.hear(1, &robots.hello(&board)));
         assert!(!stage.hear(1, &robots.hello(&board)));
         assert_eq!(stage.stops(), 1);
+    }
+
+    /// Stage, head, and a host for each of two robots, of which that of A stands by for the coordinator.
+    fn run_of_four() -> RunSpec {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios/hold.toml");
+        let host = |name: &str, service: &str, standbys: &str| {
+            format!(
+                "{{ name = \"{name}\", services = [\"{service}\"], listen = \"{name}:7447\", standbys = [{standbys}] }}"
+            )
+        };
+        let hosts = [
+            host("stage", "bridge", ""),
+            host("head", "coordinator", "\"B\""),
+            host("a", "A", "\"coordinator\""),
+            host("b", "B", ""),
+        ];
+        let set = [("team", "two".to_owned()), ("hosts", format!("[{}]", hosts.join(", ")))];
+        let set = set.map(|(key, value)| (key.to_owned(), value));
+        resolve(&load_scenario(&file, &set, None).expect("it is right")).expect("it can be run")
+    }
+
+    #[test]
+    fn a_service_is_where_the_host_says_that_the_number_names_and_the_greatest_number_counts() {
+        const HEAD: usize = 1;
+        const A: usize = 2;
+        const B: usize = 3;
+        let (run, folder) = (run_of_four(), tempfile::tempdir().expect("a folder"));
+        let board = board(folder.path());
+        let of = |host: usize| Peers::new(&run, HASH, host, 10 + host as u64);
+        let (stage, head, a, b) = (of(0), of(HEAD), of(A), of(B));
+        let coordinator = ServiceId::Coordinator;
+        stage.hear(HEAD, &head.hello(&board));
+        assert_eq!(stage.host_of(coordinator), Some(HEAD));
+        // Its own host can't take it over from itself, nor one that does not stand by for it.
+        head.take_over(coordinator);
+        b.take_over(coordinator);
+        assert_eq!((head.moves_of(coordinator), b.moves_of(coordinator)), (0, 0));
+        a.take_over(coordinator);
+        let moved = a.hello(&board);
+        stage.hear(B, &moved);
+        assert_eq!(stage.host_of(coordinator), Some(HEAD), "that is not its to say");
+        assert!(stage.hear(A, &moved) && head.hear(A, &moved));
+        assert_eq!((stage.host_of(coordinator), head.is_here(coordinator)), (Some(A), false));
+        // The old one, as a new machine that knows nothing of it, is not believed.
+        let anew = Peers::new(&run, HASH, HEAD, 99);
+        stage.hear(HEAD, &anew.hello(&board));
+        assert_eq!((stage.host_of(coordinator), stage.moves_of(coordinator)), (Some(A), 1));
+        anew.hear(A, &a.hello(&board));
+        anew.take_over(coordinator);
+        stage.hear(HEAD, &anew.hello(&board));
+        assert_eq!(
+            (stage.host_of(coordinator), stage.moves_of(coordinator)),
+            (Some(HEAD), 2),
+            "in its turn it is"
+        );
+        anew.recall_moves(coordinator, MOST_MOVES + 2);
+        assert!(!stage.hear(HEAD, &anew.hello(&board)));
+        assert_eq!(stage.moves_of(coordinator), 2);
+    }
+
+    #[test]
+    fn a_host_is_lost_when_most_have_lost_it() {
+        const HEAD: usize = 1;
+        let ms = |ms: u64| ms * 1_000_000;
+        // For how long A has heard nothing of the head, of the stage and B, and what those say of the head.
+        let is_lost = |own_ms: u64, others: [(u64, Option<u64>); 2]| {
+            let a = Peers::new(&run_of_four(), HASH, 2, 5);
+            let heard = |host: usize, silent_ms: u64, said_ms: Option<u64>| {
+                let mut known = a.peers[host].known();
+                known.heard.came_ns = now_ns() - ms(silent_ms);
+                known.silences_ns = vec![None, said_ms.map(ms), None, None];
+            };
+            heard(HEAD, own_ms, None);
+            heard(0, others[0].0, others[0].1);
+            heard(3, others[1].0, others[1].1);
+            a.is_lost(HEAD)
+        };
+        let gone = (20, Some(2000));
+        assert!(is_lost(2000, [gone, gone]));
+        assert!(!is_lost(500, [gone, gone]), "it has heard of it");
+        assert!(!is_lost(2000, [gone, (20, Some(30))]), "two of four are not most");
+        assert!(!is_lost(2000, [gone, (20, None)]), "who never heard of it can't say");
+        assert!(!is_lost(2000, [gone, (2000, Some(2000))]), "who is silent says nothing");
+        assert!(!is_lost(2000, [(2000, Some(30)), (2000, Some(30))]), "it is alone");
     }
 }

@@ -28,7 +28,11 @@ struct Fit {
 }
 
 impl Fit {
-    fn add(&mut self, found: (UnitQuaternion<f64>, Vector3<f64>), meant: (UnitQuaternion<f64>, Vector3<f64>)) {
+    fn add(
+        &mut self,
+        found: (UnitQuaternion<f64>, Vector3<f64>),
+        meant: (UnitQuaternion<f64>, Vector3<f64>),
+    ) {
         let ahead = meant.0 * found.0.inverse() * Vector3::x();
         let length = ahead.xy().norm().max(f64::MIN_POSITIVE);
         self.count += 1.0;
@@ -47,9 +51,7 @@ impl Fit {
     }
 }
 
-fn parts<B: mikoshi_spatial::CoordinateFrame>(
-    pose: &Pose<World, B>,
-) -> (UnitQuaternion<f64>, Vector3<f64>) {
+fn parts<B: mikoshi_spatial::CoordinateFrame>(pose: &Pose<World, B>) -> (UnitQuaternion<f64>, Vector3<f64>) {
     (pose.rotation, pose.translation)
 }
 

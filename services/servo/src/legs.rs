@@ -10,8 +10,9 @@ use mikoshi_humanoid::balance::{
 };
 use mikoshi_humanoid::estimate::FootContact;
 use mikoshi_humanoid::gait::{
-    FootPlacement, Foothold, Gait, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose, HandCentre,
-    PreviewConfig, SoleCorrection, SoleTracking, StepClock, StepTiming, StepWish, SwingConfig, wrap,
+    FootPlacement, Foothold, Gait, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose,
+    HandCentre, PreviewConfig, SoleCorrection, SoleTracking, StepClock, StepTiming, StepWish, SwingConfig,
+    wrap,
 };
 use mikoshi_ipc_types::MAX_HANDS;
 use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, Wrench};
