@@ -9,8 +9,12 @@ use mikoshi_runtime::State;
 use serde_json::Value;
 use std::process::{Command, Stdio};
 
+/// In it the team walks.
+const LOST_TICK: u64 = 900;
+/// Ticks in which the team has come to stand.
+const STAND_TICKS: u64 = 600;
 /// Ticks in which what must happen has long happened.
-const AMPLE_TICKS: u64 = 3000;
+const AMPLE_TICKS: u64 = 1500;
 
 /// What a summary says of stops, by robot where it is one's.
 fn faults(summary: &Value) -> Vec<&str> {
@@ -22,7 +26,7 @@ fn faults(summary: &Value) -> Vec<&str> {
 fn goes_on_and_stops(team: &mut Team<'_>, operator: &str) {
     team.host(operator).run(&program("mikoshi"), &["resume"]);
     let resumed = team.tick(STAGE);
-    team.wait_for_tick(resumed + 600);
+    team.wait_for_tick(resumed + 300);
     team.host(operator).run(&program("mikoshi"), &["stop"]);
 }
 
@@ -56,16 +60,19 @@ fn says_late(team: &Team<'_>, certificates: &std::path::Path) -> Value {
 #[test]
 fn a_coordinator_whose_host_is_lost_has_a_successor_on_another_and_the_old_one_is_refused() {
     let (a, b) = (robot_host("A"), robot_host("B"));
-    let plan = walk_with(2, 0.06, &["duration_s=45", "motion.random.duration_s=40"], &[(&a, "coordinator")]);
+    let plan = walk_with(2, 0.06, &[], &[(&a, "coordinator")]);
     let mut team = or_skip!(Team::gather(&plan));
     let head = team.cluster.index_of(HEAD);
     team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(2.0));
     team.start();
-    team.wait_for_tick(1300);
+    team.wait_for_tick(LOST_TICK);
     // It is not dead, only of no use: whether it comes back nobody knows.
     team.signal(HEAD, libc::SIGSTOP);
+    let has_moved = || team.moves(&a, ServiceId::Coordinator) == 1;
+    team.wait_until(AMPLE_TICKS, has_moved);
+    assert!(has_moved(), "{}\n{}", team.standby(&a, "coordinator"), team.words());
     wait_until_it_goes(&team, &a, ServiceId::Coordinator);
-    let lost_ticks = team.tick(STAGE) - 1300;
+    let lost_ticks = team.tick(STAGE) - LOST_TICK;
     team.signal(HEAD, libc::SIGCONT);
     let status = team.wait_for_end(HEAD, "mikoshi-coordinator");
     eprintln!("in charge again after {lost_ticks} ticks; the old one ended with {status:?}");
@@ -83,6 +90,7 @@ fn a_coordinator_whose_host_is_lost_has_a_successor_on_another_and_the_old_one_i
     team.wait_until(AMPLE_TICKS, || refused() - before > sent / 2);
     eprintln!("{said}: {} refused by epoch", refused() - before);
     assert!(sent > 0 && refused() - before > sent / 2);
+    team.wait_for_tick(LOST_TICK + lost_ticks + STAND_TICKS);
     goes_on_and_stops(&mut team, &a);
     for host in [STAGE, HEAD, &a, &b] {
         tell(&team, host);
@@ -99,18 +107,23 @@ fn a_coordinator_whose_host_is_lost_has_a_successor_on_another_and_the_old_one_i
 #[test]
 fn a_machine_in_the_place_of_a_robots_goes_on_from_what_was_kept_elsewhere() {
     let b = robot_host("B");
-    let plan = walk_with(2, 0.06, &["duration_s=45", "motion.random.duration_s=40"], &[(HEAD, "B")]);
+    let plan = walk_with(2, 0.06, &[], &[(HEAD, "B")]);
     let mut team = or_skip!(Team::gather(&plan));
     let head = team.cluster.index_of(HEAD);
     team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(2.0));
     team.start();
-    team.wait_for_tick(1300);
+    team.wait_for_tick(LOST_TICK);
+    for name in ["mikoshi-link", "mikoshi-servo"] {
+        team.kill(&b, name);
+    }
+    // Until its robot has played its plan for that, and stands.
+    team.wait_for_tick(LOST_TICK + STAND_TICKS);
     team.replace(&b);
     wait_until_it_goes(&team, &b, ServiceId::Servo(1));
     let (since, now) = (team.standby(&b, "servo-1"), team.tick(STAGE));
     eprintln!("back in tick {now}: {since}");
     // It stands with the others.
-    team.wait_for_tick(now + 600);
+    team.wait_for_tick(now + STAND_TICKS);
     goes_on_and_stops(&mut team, HEAD);
     for host in [STAGE, HEAD, &b] {
         tell(&team, host);

@@ -258,6 +258,11 @@ impl<'p> Team<'p> {
         )
     }
 
+    /// How often a service has moved, as a host knows.
+    pub fn moves(&self, host: &str, service: ServiceId) -> u64 {
+        mikoshi_runtime::Board::open(&self.host(host).file(RUN)).expect("it is there").moves_of(service)
+    }
+
     /// What a host's link says of a service that has a standby.
     pub fn standby(&self, host: &str, service: &str) -> Value {
         let report = self.report(host);
