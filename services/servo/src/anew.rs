@@ -12,8 +12,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// Ticks without it after which drives are no more where they would be with it: until then a plan follows the team's
 /// clock.
 const ADRIFT_TICKS: u64 = 2 * FALLBACK_PARTS as u64;
-/// No joint of a robot that stands is faster \[rad/s\].
-const STILL_RAD_S: f64 = 0.05;
 /// Share of its weight that each of its feet bears at least.
 const LEAST_FOOT_SHARE: f64 = 0.1;
 
@@ -62,13 +60,13 @@ impl Servo {
         next_tick > 0 && tick.saturating_sub(next_tick) > ADRIFT_TICKS
     }
 
-    /// Whether the robot stands still on both feet.
-    pub(crate) fn stands_still(&self, sensors: &Sensors) -> bool {
-        let joints = self.joint_count().min(MAX_JOINTS);
+    /// Whether the robot stands on both feet, after whatever plan it had.
+    pub(crate) fn stands_still(&self, tick: u64, sensors: &Sensors) -> bool {
+        let has_rested =
+            tick.saturating_sub(sensors.next_joint_command_tick) > self.fallback.longest_plan_ticks();
         let least_n = LEAST_FOOT_SHARE * self.legs.pendulum.weight_n();
         let bears = |wrench: &[f64; 6]| Vector3::new(wrench[0], wrench[1], wrench[2]).norm() > least_n;
-        sensors.joint_velocity_rad_s.iter().take(joints).all(|rate| rate.abs() < STILL_RAD_S)
-            && sensors.ankle_wrench.iter().all(bears)
+        has_rested && sensors.ankle_wrench.iter().all(bears)
     }
 
     /// Begins anew where the robot stands: up is where gravity says, ahead and where in the world what the hands hold,

@@ -82,6 +82,14 @@ impl Fallback {
         })
     }
 
+    /// Ticks in which any plan has come to its end that began with the last command.
+    pub(crate) fn longest_plan_ticks(&self) -> u64 {
+        let rest_ticks = (MOST_REST_S / self.period_s).ceil() as u64;
+        let knots = PARTS - 2;
+        let spacing_ticks = self.spacing_ticks.max((self.braking_ticks + rest_ticks).div_ceil(knots));
+        3 * PARTS + spacing_ticks * knots
+    }
+
     /// None yet.
     pub(crate) fn none(&self, legs: &Legs, state: &LegsState, ik: &IkState) -> FallbackState {
         FallbackState {

@@ -147,7 +147,7 @@ impl<T: Transport> ServoParticipant<T> {
     fn find_robot(&mut self, tick: u64) {
         let is_told = self.heard.next_usable_tick + self.coordination_delay_ticks == tick + 1;
         let sensors = &self.sensors.payload;
-        let can_be_found = is_told && self.heard.has_sensors != 0 && self.servo.stands_still(sensors);
+        let can_be_found = is_told && self.heard.has_sensors != 0 && self.servo.stands_still(tick, sensors);
         if can_be_found
             && self.servo.begin_anew(&mut self.state, &mut self.scratch, sensors, &self.command).is_ok()
         {
