@@ -277,7 +277,8 @@ fn concerns_servo(topic: Topic, robot: usize) -> bool {
 /// What becomes of two robots of which one is cut off while they walk, for this many ticks, and who go on later.
 fn cut_off(lost: usize, eighth: u64, ticks: u64) -> Fate {
     // Once it is found it sets its feet where they belong; the team goes on when it stands.
-    let mut run = walk("two", 0.1, "0.5", "[{ at_s = 12.0, says = \"resume\" }]");
+    let mut run =
+        walk("two", 0.1, "0.5", "[{ at_s = 11.5, says = \"resume\" }, { at_s = 13.0, says = \"resume\" }]");
     run.ticks = 3000;
     let from = WALKING + eighth * STEP / 8;
     let silent = from..from + ticks;

@@ -93,8 +93,10 @@ impl<T: Transport> ServoParticipant<T> {
         let received = self.sensor_port.receive(tick, &mut self.sensors);
         let sensors = &self.sensors.payload;
         let has_arrived = has_arrived(&received);
+        // Who has heard sensors all along knows its robot, though nobody may hear it.
+        let was_blind = self.heard.has_sensors == 0;
         self.heard.has_sensors = u64::from(received.is_ok() && self.servo.believes(sensors));
-        if self.heard.has_sensors != 0 && Servo::is_adrift(tick, sensors) {
+        if was_blind && self.heard.has_sensors != 0 && Servo::is_adrift(tick, sensors) {
             self.heard.is_adrift = 1;
         }
         if self.heard.is_adrift != 0 {
