@@ -24,9 +24,12 @@ fn faults(summary: &Value) -> Vec<&str> {
 
 /// Lets the team go on, and stops it: it stops only if it had gone on.
 fn goes_on_and_stops(team: &mut Team<'_>, operator: &str) {
-    team.host(operator).run(&program("mikoshi"), &["resume"]);
-    let resumed = team.tick(STAGE);
-    team.wait_for_tick(resumed + 300);
+    // It is heard when the team stands.
+    for _ in 0..3 {
+        team.host(operator).run(&program("mikoshi"), &["resume"]);
+        let said = team.tick(STAGE);
+        team.wait_for_tick(said + 100);
+    }
     team.host(operator).run(&program("mikoshi"), &["stop"]);
 }
 
@@ -60,7 +63,7 @@ fn says_late(team: &Team<'_>, certificates: &std::path::Path) -> Value {
 #[test]
 fn a_coordinator_whose_host_is_lost_has_a_successor_on_another_and_the_old_one_is_refused() {
     let (a, b) = (robot_host("A"), robot_host("B"));
-    let plan = walk_with(2, 0.06, &[], &[(&a, "coordinator")]);
+    let plan = walk_with(2, 0.06, &["slow_motion=3"], &[(&a, "coordinator")]);
     let mut team = or_skip!(Team::gather(&plan));
     let head = team.cluster.index_of(HEAD);
     team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(2.0));
@@ -107,7 +110,7 @@ fn a_coordinator_whose_host_is_lost_has_a_successor_on_another_and_the_old_one_i
 #[test]
 fn a_machine_in_the_place_of_a_robots_goes_on_from_what_was_kept_elsewhere() {
     let b = robot_host("B");
-    let plan = walk_with(2, 0.06, &[], &[(HEAD, "B")]);
+    let plan = walk_with(2, 0.06, &["slow_motion=3"], &[(HEAD, "B")]);
     let mut team = or_skip!(Team::gather(&plan));
     let head = team.cluster.index_of(HEAD);
     team.cluster.wire.set(head, 0..4, |way| *way = Way::bad(2.0));
