@@ -1,15 +1,20 @@
-//! Which hands hold the object: a hand closes where its palm is near its place, and opens when it is told to.
+//! Which hands hold the object: a hand closes where its palm is near its place, and opens when it is told to. It is pulled to
+//! its place; hands of a robot that leaves and joins take hold of the object where they are, as others carry it.
 
 use crate::layout::{HandLayout, Layout};
 use crate::pose::{body_pose, site_pose};
-use mikoshi_ipc_types::JointCommand;
-use mikoshi_spatial::{Hand, Object};
-use mujoco_rs::prelude::{MjData, MjModel};
+use mikoshi_ipc_types::{JointCommand, MAX_HANDS, PoseWire};
+use mikoshi_spatial::{Hand, Object, Pose};
+use mujoco_rs::prelude::{MjData, MjModel, MjtSameFrame};
+use nalgebra::UnitQuaternion;
 
 /// How near its place on the object a palm must be for its hand to close on it.
 const REACH_M: f64 = 0.02;
 /// The same about an axis.
 const REACH_RAD: f64 = 0.1;
+
+/// Where on the object each hand of a robot has taken hold; zeros where it is pulled to its place.
+pub type Taken = [PoseWire; MAX_HANDS];
 
 /// Closes and opens hands as commanded; bit h of `holding` says for each robot whether hand h holds. What
 /// changes acts from the second physics step on: the first one's constraints are set up already.
@@ -17,14 +22,25 @@ pub fn close_and_open(
     data: &mut MjData<Box<MjModel>>,
     layout: &Layout,
     commands: &[JointCommand],
-    holding: &mut [u64],
+    (holding, taken): (&mut [u64], &mut [Taken]),
 ) {
-    for ((robot, command), holding) in layout.robots.iter().zip(commands).zip(holding) {
-        for (index, hand) in robot.hands.iter().enumerate() {
+    let robots = layout.robots.iter().zip(commands).zip(holding.iter_mut().zip(taken));
+    for ((robot, command), (holding, taken)) in robots {
+        for (index, (hand, taken)) in robot.hands.iter().zip(taken).enumerate() {
             let bit = 1 << index;
             let (holds, shall_hold) = (*holding & bit != 0, command.closed_hands & bit != 0);
-            if holds == shall_hold || shall_hold && !is_in_reach(data, layout, hand) {
+            if holds == shall_hold {
                 continue;
+            }
+            if shall_hold {
+                let palm = palm_in_object(data, layout, hand);
+                if !is_in_reach(hand, &palm) {
+                    continue;
+                }
+                if hand.takes_hold_where_it_is {
+                    *taken = palm.to_array();
+                    move_site(data, hand, taken);
+                }
             }
             *holding ^= bit;
             if let Some(equality) = hand.equality {
@@ -34,8 +50,35 @@ pub fn close_and_open(
     }
 }
 
-fn is_in_reach(data: &MjData<Box<MjModel>>, layout: &Layout, hand: &HandLayout) -> bool {
-    let place = body_pose::<Object>(data, &layout.object) * hand.place_on_object;
-    let gap = place.displacement_to(&site_pose::<Hand>(data, hand.palm_site));
+/// Has all hands hold where they have taken hold, in a model that may not know of it.
+pub fn restore(data: &mut MjData<Box<MjModel>>, layout: &Layout, taken: &[Taken]) {
+    for (robot, taken) in layout.robots.iter().zip(taken) {
+        for (hand, taken) in robot.hands.iter().zip(taken) {
+            move_site(data, hand, taken);
+        }
+    }
+}
+
+/// The site that a hand is pulled to.
+fn move_site(data: &mut MjData<Box<MjModel>>, hand: &HandLayout, X_OH: &PoseWire) {
+    let [x, y, z, quaternion @ ..] = *X_OH;
+    if quaternion == [0.0; 4] {
+        return;
+    }
+    // SAFETY: numbers of the model change, no size and no index.
+    let model = unsafe { data.model_mut() };
+    model.site_pos_mut()[hand.object_site] = [x, y, z];
+    model.site_quat_mut()[hand.object_site] = quaternion;
+    model.site_sameframe_mut()[hand.object_site] = MjtSameFrame::mjSAMEFRAME_NONE;
+}
+
+fn palm_in_object(data: &MjData<Box<MjModel>>, layout: &Layout, hand: &HandLayout) -> Pose<Object, Hand> {
+    let X_WO = body_pose::<Object>(data, &layout.object);
+    let palm = X_WO.inverse() * site_pose::<Hand>(data, hand.palm_site);
+    Pose::new(palm.translation, UnitQuaternion::new_normalize(palm.rotation.into_inner()))
+}
+
+fn is_in_reach(hand: &HandLayout, palm: &Pose<Object, Hand>) -> bool {
+    let gap = hand.place_on_object.displacement_to(palm);
     gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
 }
