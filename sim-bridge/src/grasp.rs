@@ -16,8 +16,6 @@ pub struct GraspSite {
     pub pose_in_object: Isometry3<f64>,
     /// Whether the hand holds at tick 0.
     pub begins_closed: bool,
-    /// Whether the hand takes hold of the object where it is: of an object that others carry.
-    pub takes_hold_where_it_is: bool,
 }
 
 /// The grasps of all robots' grasping hands, in hand order.
@@ -31,7 +29,6 @@ pub fn sites(scenario: &Scenario, robots: &[Robot]) -> Vec<GraspSite> {
             palm,
             pose_in_object,
             begins_closed: scenario.begins_closed(robot.name()),
-            takes_hold_where_it_is: scenario.membership_of(robot.name()).next().is_some(),
         };
         palms.zip(poses).map(site).collect::<Vec<_>>()
     };

@@ -1,5 +1,5 @@
 //! Which hands hold the object: a hand closes where its palm is near its place, and opens when it is told to. It is pulled to
-//! its place; hands of a robot that leaves and joins take hold of the object where they are, as others carry it.
+//! its place where the object rests; of an object that hangs in other robots' hands it takes hold where it is.
 
 use crate::layout::{HandLayout, Layout};
 use crate::pose::{body_pose, site_pose};
@@ -23,9 +23,13 @@ pub fn close_and_open(
     layout: &Layout,
     commands: &[JointCommand],
     (holding, taken): (&mut [u64], &mut [Taken]),
+    has_failed: impl Fn(usize, usize) -> bool,
 ) {
+    let held = holding.iter().enumerate();
+    let holders = held.fold(0_u64, |set, (robot, holding)| set | u64::from(*holding != 0) << robot);
     let robots = layout.robots.iter().zip(commands).zip(holding.iter_mut().zip(taken));
-    for ((robot, command), (holding, taken)) in robots {
+    for (index_of_robot, ((robot, command), (holding, taken))) in robots.enumerate() {
+        let others_hold = holders & !(1 << index_of_robot) != 0;
         for (index, (hand, taken)) in robot.hands.iter().zip(taken).enumerate() {
             let bit = 1 << index;
             let (holds, shall_hold) = (*holding & bit != 0, command.closed_hands & bit != 0);
@@ -37,7 +41,7 @@ pub fn close_and_open(
                 if !is_in_reach(hand, &palm) {
                     continue;
                 }
-                if hand.takes_hold_where_it_is {
+                if others_hold && !has_failed(index_of_robot, index) {
                     *taken = palm.to_array();
                     move_site(data, hand, taken);
                 }

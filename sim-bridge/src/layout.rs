@@ -70,8 +70,6 @@ pub struct HandLayout {
     pub object_site: usize,
     /// Where on the object it was to hold: the same without the grasp offset.
     pub place_on_object: Pose<Object, Hand>,
-    /// Whether it takes hold of the object where it is, and is not pulled to its place.
-    pub takes_hold_where_it_is: bool,
     /// The weld, where there is one.
     pub equality: Option<usize>,
 }
@@ -173,7 +171,6 @@ impl Finder<'_> {
                 object_site: self.id(MjtObjBase::mjOBJ_SITE, &grasp.site)?,
                 // It was found to be a pose when the robot was resolved.
                 place_on_object: Pose::from_array(place).unwrap_or_else(Pose::identity),
-                takes_hold_where_it_is: grasp.takes_hold_where_it_is,
                 equality: self.0.name_to_id(MjtObjBase::mjOBJ_EQUALITY, &grasp.palm),
             })
         });

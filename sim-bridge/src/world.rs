@@ -266,7 +266,9 @@ impl Physics for World {
         }
         self.push_script.begin(pushes, *tick);
         let is_pushed = are_active(pushes, *tick);
-        grip::close_and_open(&mut self.data, &self.layout, commands, (holding, taken));
+        let failures = &self.failures;
+        let has_failed = |robot, hand| failures.of_hand(*tick, robot, hand).is_some();
+        grip::close_and_open(&mut self.data, &self.layout, commands, (holding, taken), has_failed);
         self.failures.undo(*tick, &mut self.data, &self.layout, holding);
         self.scratch.tallies.fill(Tally::empty());
         self.scratch.contacts = Contacts::default();

@@ -78,6 +78,14 @@ impl Hand {
         robot.apply(world, self.palm, &-self.wrench);
     }
 
+    /// It closes on an object that hangs in other robots' hands: where it is.
+    pub fn take_hold(&mut self, world: &PhysicsWorld, robot: &Articulation, object: RigidBodyHandle) {
+        let Some(body) = world.bodies.get(object) else { return };
+        let X_WO = pose::<World, Object>(&from_isometry(body.position()));
+        let X_OH = X_WO.inverse() * robot.frame_pose::<HandFrame>(world, self.palm);
+        self.pulled_to = Isometry3::from_parts(X_OH.translation.into(), X_OH.rotation);
+    }
+
     /// Whether it could close on the object.
     pub fn is_in_reach(&self, world: &PhysicsWorld, robot: &Articulation, object: RigidBodyHandle) -> bool {
         let Some(body) = world.bodies.get(object) else { return false };
