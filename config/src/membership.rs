@@ -39,6 +39,18 @@ fn default_draw_back_m() -> f64 {
 }
 
 impl Membership {
+    /// Of this robot, neither to leave nor to join, with what is usual.
+    pub fn of(robot: &str) -> Self {
+        Self {
+            robot: robot.to_owned(),
+            leave_s: None,
+            join_s: None,
+            distance_m: default_distance_m(),
+            speed_m_s: default_speed_m_s(),
+            draw_back_m: default_draw_back_m(),
+        }
+    }
+
     /// No robot walks off farther.
     pub const MAX_DISTANCE_M: f64 = 5.0;
     /// No robot walks off faster: nobody but its own feet tells it to slow down.

@@ -30,7 +30,7 @@ use mikoshi_cooperation::HandReference;
 use mikoshi_humanoid::gait::StepTiming;
 use mikoshi_ipc_types::{
     MAX_HANDS_OF_TEAM, MAX_ROBOTS, RobotState, TeamState, all_hands, member_fault as fault,
-    member_stage as stage,
+    member_stage as stage, mode,
 };
 use mikoshi_spatial::{Object, Pose, World};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -126,9 +126,8 @@ unsafe impl Pod for MembershipState {}
 pub(crate) struct Team<'a> {
     pub tick: u64,
     pub phase: &'a Phase,
-    /// What the object is to follow, and where it is.
+    /// What the object is to follow.
     pub X_WA_ref: &'a Pose<World, Object>,
-    pub X_WA: &'a Pose<World, Object>,
     /// The reference is at rest, and the team's feet stand and want to.
     pub rests: bool,
     /// The team's own clock stands.
@@ -258,7 +257,10 @@ impl Memberships {
             let arms = self.arms(index);
             let (references, kept) = (references.get_mut(arms.clone())?, kept.get_mut(arms)?);
             if !robot.rig.is_there() {
-                // Away from the beginning: where it is.
+                // Away from the beginning: where it is, as soon as it is known where the object is.
+                if !mode::is_hybrid(team.phase.mode()) {
+                    continue;
+                }
                 robot.rig = Rig::at(&(*team.X_WA_ref * entry.X_AG_away), references);
             }
             let share = if is_stopped { 0.0 } else { said.speed_share };
@@ -511,4 +513,167 @@ impl RobotMembership {
 /// Sets of hands of robots travel as those of the team.
 pub(crate) fn closed_hands(state: &MembershipState, robot: usize, present: u64, hands: usize) -> u64 {
     if state.closes(robot) { all_hands(hands) } else { present }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mikoshi_spatial::{Twist, Wrench};
+
+    const WELL: Seen = Seen {
+        stands: true,
+        in_reach: true,
+        all_hold: true,
+        none_holds: true,
+        force_n: 0.1,
+        moment_nm: 0.01,
+        is_spare: true,
+    };
+
+    /// One robot that is to leave in tick 10 and to join in tick 20000, with what it is told so far.
+    struct Trial {
+        memberships: Memberships,
+        state: MembershipState,
+        references: [HandReference; 1],
+        tick: u64,
+        rests: bool,
+        speed_share: f64,
+    }
+
+    impl Trial {
+        fn new() -> Self {
+            let away = Pose::new(Vector3::new(-0.5, 0.0, 0.0), UnitQuaternion::identity());
+            let entry = Entry {
+                leave: Some(10),
+                join: Some(20_000),
+                X_AG_away: away,
+                draw_back_m: 0.05,
+                speed_m_s: 0.06,
+                walk: 4000,
+            };
+            let ticks = Ticks { patience: 2000, grip: 400, halt: 4000, walk_patience: 1000 };
+            let reference =
+                HandReference { pose: Pose::identity(), twist: Twist::zero(), wrench: Wrench::zero() };
+            Self {
+                memberships: Memberships {
+                    entries: vec![vec![entry]],
+                    hands_of_robots: vec![1],
+                    period_s: 0.005,
+                    ticks,
+                },
+                state: MembershipState::zeroed(),
+                references: [reference],
+                tick: 0,
+                rests: true,
+                speed_share: 1.0,
+            }
+        }
+
+        /// The stages that begin until `tick`, all being as `seen`; and the changes that they ask for.
+        fn go_on(&mut self, tick: u64, seen: &Seen) -> (Vec<u64>, Vec<Change>) {
+            let (mut stages, mut changes) = (vec![], vec![]);
+            let robot = RobotState { speed_share: self.speed_share, ..RobotState::zeroed() };
+            let phase = Phase::Carrying { since: 0 };
+            while self.tick < tick {
+                let team = Team {
+                    tick: self.tick,
+                    phase: &phase,
+                    X_WA_ref: &Pose::identity(),
+                    rests: self.rests,
+                    clock_stands: true,
+                };
+                let mut kept = [[0.0; 7]];
+                let references = (&mut self.references[..], &mut kept[..]);
+                let robots = core::iter::once(&robot);
+                self.memberships.lead(&mut self.state, &team, robots, false, references).expect("a state");
+                let before = self.state.robots[0].stage;
+                let clock = TeamClockState::default();
+                let change = self.memberships.next(&mut self.state, 0, &team, seen, &clock);
+                if let Some(Change::Leaves(robot)) = change {
+                    self.memberships.let_go(&mut self.state, robot, team.X_WA_ref, &self.references);
+                }
+                changes.extend(change);
+                let now = self.state.robots[0].stage;
+                stages.extend((now != before).then_some(now));
+                self.tick += 1;
+            }
+            (stages, changes)
+        }
+
+        fn fault(&self) -> u64 {
+            self.state.robots[0].fault
+        }
+    }
+
+    #[test]
+    fn all_goes_well() {
+        let mut trial = Trial::new();
+        let (out, changes) = trial.go_on(20_000, &WELL);
+        let way = [
+            stage::HALTING,
+            stage::UNBURDENING,
+            stage::OPENING,
+            stage::WITHDRAWING,
+            stage::LEAVING,
+            stage::AWAY,
+        ];
+        assert_eq!((&out[..], changes), (&way[..], vec![Change::Leaves(0)]));
+        assert_eq!(trial.memberships.weights(&trial.state)[..2], [0.0, 1.0]);
+        let (back, changes) = trial.go_on(40_000, &WELL);
+        let way = [
+            stage::RETURNING,
+            stage::APPROACHING,
+            stage::REACHING,
+            stage::CLOSING,
+            stage::JOINING,
+            stage::MEMBER,
+        ];
+        assert_eq!((&back[..], changes), (&way[..], vec![Change::Joins(0)]));
+        assert_eq!((trial.memberships.weights(&trial.state)[0], trial.fault()), (1.0, 0));
+    }
+
+    #[test]
+    fn an_object_that_does_not_come_to_rest_is_not_left() {
+        let mut trial = Trial::new();
+        trial.rests = false;
+        assert_eq!(trial.go_on(15_000, &WELL), (vec![stage::HALTING, stage::MEMBER], vec![]));
+        assert_eq!(trial.fault(), fault::RESTLESS);
+        // It is not tried again, and nothing is left to join.
+        trial.rests = true;
+        assert_eq!(trial.go_on(40_000, &WELL), (vec![], vec![]));
+    }
+
+    #[test]
+    fn hands_that_go_on_to_bear_something_are_not_opened() {
+        for seen in [Seen { force_n: 3.0, ..WELL }, Seen { moment_nm: 1.0, ..WELL }] {
+            let mut trial = Trial::new();
+            let stages = vec![stage::HALTING, stage::UNBURDENING, stage::JOINING, stage::MEMBER];
+            assert_eq!(trial.go_on(15_000, &seen), (stages, vec![]));
+            assert_eq!(trial.fault(), fault::BURDENED);
+            assert_eq!(trial.memberships.weights(&trial.state)[0], 1.0);
+        }
+    }
+
+    #[test]
+    fn who_does_not_get_away_stands_where_it_is_and_who_does_not_come_near_goes_back() {
+        let mut trial = Trial::new();
+        trial.go_on(1500, &WELL);
+        trial.speed_share = 0.0;
+        assert_eq!(trial.go_on(19_000, &WELL).0, [stage::AWAY]);
+        assert_eq!(trial.fault(), fault::STRANDED);
+        trial.speed_share = 1.0;
+        let (stages, changes) = trial.go_on(40_000, &Seen { in_reach: false, ..WELL });
+        let back = [stage::WITHDRAWING, stage::LEAVING, stage::AWAY];
+        assert_eq!((&stages[stages.len() - 3..], &changes[..]), (&back[..], &[][..]), "{stages:?}");
+        assert_eq!(trial.fault(), fault::OUT_OF_REACH);
+    }
+
+    #[test]
+    fn whoever_is_asked_back_on_the_way_out_turns_round() {
+        let mut trial = Trial::new();
+        trial.memberships.entries[0][0].join = Some(300);
+        let (stages, changes) = trial.go_on(3000, &WELL);
+        assert_eq!(stages, [stage::HALTING, stage::UNBURDENING, stage::JOINING, stage::MEMBER]);
+        assert_eq!(changes, []);
+    }
 }

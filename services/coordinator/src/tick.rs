@@ -383,7 +383,6 @@ impl Coordinator {
             tick,
             phase: &phase,
             X_WA_ref: &X_WA_ref,
-            X_WA: &law_output.position.external,
             rests: motion.twist == [0.0; 6] && clock.is_standing() && wishes.are_content(),
             clock_stands: clock.is_standing(),
         };
