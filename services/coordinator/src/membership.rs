@@ -608,7 +608,7 @@ mod tests {
     #[test]
     fn all_goes_well() {
         let mut trial = Trial::new();
-        let (out, changes) = trial.go_on(20_000, &WELL);
+        let (out, changes) = trial.go_on(19_999, &WELL);
         let way = [
             stage::HALTING,
             stage::UNBURDENING,

@@ -168,7 +168,7 @@ fn who_is_needed_does_not_leave() {
     let leave = ("membership", r#"[{robot = "B", leave_s = 2.0}]"#);
     // Of three robots one has lost the object before.
     let three = ("team", "three");
-    let mut team = Team::obedient(&[three, leave, ("safety.lost_grasp", "carry-on")]);
+    let mut team = Team::holding(&[three, leave, ("safety.lost_grasp", "carry-on")]);
     team.go_on(100);
     for hand in [4, 5] {
         team.lost.push(hand);
