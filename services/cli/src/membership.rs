@@ -13,7 +13,8 @@ pub fn asked_from(run: &RunSpec, robot: &str, leaves: bool, tick: u64) -> Result
     let mut entries = scenario.membership.clone();
     let period_s = scenario.control_period_s;
     let last = entries.iter().rposition(|entry| entry.robot == robot);
-    let asked_s = last.and_then(|last| entries[last].leave_s.max(entries[last].join_s));
+    let asked_s =
+        last.and_then(|last| entries[last].leave_s.into_iter().chain(entries[last].join_s).reduce(f64::max));
     let time_s = (tick as f64 * period_s).max(asked_s.map_or(0.0, |asked_s| asked_s + period_s));
     let is_away = last.is_some_and(|last| entries[last].join_s.is_none());
     match last {
