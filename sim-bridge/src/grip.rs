@@ -1,5 +1,6 @@
 //! Which hands hold the object: a hand closes where its palm is near its place, and opens when it is told to. It is pulled to
-//! its place where the object rests; of an object that hangs in other robots' hands it takes hold where it is.
+//! its place where the object rests. Of an object that hangs in other robots' hands it takes hold where it is, near where it
+//! held before.
 
 use crate::layout::{HandLayout, Layout};
 use crate::pose::{body_pose, site_pose};
@@ -37,8 +38,12 @@ pub fn close_and_open(
                 continue;
             }
             if shall_hold {
-                let palm = palm_in_object(data, layout, hand);
-                if !is_in_reach(hand, &palm) {
+                let palm = in_object(data, layout, hand.palm_site);
+                let place = match others_hold {
+                    true => in_object(data, layout, hand.object_site),
+                    false => hand.place_on_object,
+                };
+                if !is_in_reach(&place, &palm) {
                     continue;
                 }
                 if others_hold && !has_failed(index_of_robot, index) {
@@ -76,13 +81,14 @@ fn move_site(data: &mut MjData<Box<MjModel>>, hand: &HandLayout, X_OH: &PoseWire
     model.site_sameframe_mut()[hand.object_site] = MjtSameFrame::mjSAMEFRAME_NONE;
 }
 
-fn palm_in_object(data: &MjData<Box<MjModel>>, layout: &Layout, hand: &HandLayout) -> Pose<Object, Hand> {
+/// Where a site is on the object.
+fn in_object(data: &MjData<Box<MjModel>>, layout: &Layout, site: usize) -> Pose<Object, Hand> {
     let X_WO = body_pose::<Object>(data, &layout.object);
-    let palm = X_WO.inverse() * site_pose::<Hand>(data, hand.palm_site);
-    Pose::new(palm.translation, UnitQuaternion::new_normalize(palm.rotation.into_inner()))
+    let X_OS = X_WO.inverse() * site_pose::<Hand>(data, site);
+    Pose::new(X_OS.translation, UnitQuaternion::new_normalize(X_OS.rotation.into_inner()))
 }
 
-fn is_in_reach(hand: &HandLayout, palm: &Pose<Object, Hand>) -> bool {
-    let gap = hand.place_on_object.displacement_to(palm);
+fn is_in_reach(place: &Pose<Object, Hand>, palm: &Pose<Object, Hand>) -> bool {
+    let gap = place.displacement_to(palm);
     gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
 }

@@ -103,7 +103,10 @@ impl Figures {
             tracker: ObjectTracker::new(&run),
             internal: InternalFigures::new(&run),
             load: LoadFigures::default(),
-            members: MemberFigures::new(run.robots.iter().map(|robot| (robot.name.clone(), robot.hands))),
+            members: MemberFigures::new(
+                run.control_period_s,
+                run.robots.iter().map(|robot| (robot.name.clone(), robot.hands)),
+            ),
             course: Course::new(run.control_period_s),
             run,
             modes: vec![],

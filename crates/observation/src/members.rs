@@ -1,7 +1,7 @@
 //! Robots that leave and join: when, and what it cost the others.
 
 use crate::canonical::Observation;
-use crate::internal::raise;
+use crate::internal::{JUDGED_AFTER_S, raise};
 use crate::summary::MemberSummary;
 use crate::truth::TrackedObject;
 use mikoshi_ipc_types::{MAX_ROBOTS, PoseWire, member_fault, member_stage, mode};
@@ -10,6 +10,9 @@ use nalgebra::Vector3;
 /// The stages of robots that leave or join, one after the other, each with what was largest while it lasted.
 #[derive(Clone, Debug)]
 pub(crate) struct MemberFigures {
+    /// How long after its start the law is judged.
+    judged_after: u64,
+    start_tick: Option<u64>,
     names: Vec<String>,
     hands: Vec<usize>,
     /// Where in `stages` each robot's present one is.
@@ -30,9 +33,19 @@ struct Stage {
 }
 
 impl MemberFigures {
-    pub(crate) fn new(robots: impl Iterator<Item = (String, usize)>) -> Self {
+    pub(crate) fn new(control_period_s: f64, robots: impl Iterator<Item = (String, usize)>) -> Self {
         let (names, hands) = robots.unzip();
-        Self { names, hands, present: vec![], faults: [0; MAX_ROBOTS], stages: vec![], references: vec![] }
+        let judged_after = (JUDGED_AFTER_S / control_period_s).round() as u64;
+        Self {
+            judged_after,
+            start_tick: None,
+            names,
+            hands,
+            present: vec![],
+            faults: [0; MAX_ROBOTS],
+            stages: vec![],
+            references: vec![],
+        }
     }
 
     pub(crate) fn observe(&mut self, observation: &Observation, object: &TrackedObject) {
@@ -52,6 +65,8 @@ impl MemberFigures {
         let internal_n = object.internal.iter().map(of_row).fold(0.0, f64::max);
         let error = object.X_WA_ref.map(|X_WA_ref| X_WA_ref.displacement_to(&object.X_WA));
         let object_m = error.map_or(0.0, |error| error.linear.norm());
+        let start = *self.start_tick.get_or_insert(observation.tick());
+        let is_judged = observation.tick() >= start + self.judged_after;
         let robots = team.member_stage.iter().zip(&team.member_fault).take(self.names.len().min(MAX_ROBOTS));
         for (robot, (&stage, &fault)) in robots.enumerate() {
             let is_new = self.present.get(robot).is_none_or(|&present| self.stages[present].stage != stage);
@@ -72,7 +87,9 @@ impl MemberFigures {
             let figures = &mut self.stages[self.present[robot]].figures;
             figures.ticks += 1;
             raise(&mut figures.hand_step_max_m, step_m);
-            raise(&mut figures.internal_peak_n, internal_n);
+            if is_judged {
+                raise(&mut figures.internal_peak_n, internal_n);
+            }
             raise(&mut figures.object_peak_m, object_m);
             if core::mem::replace(&mut self.faults[robot], fault) != fault && fault != 0 {
                 figures.fault = Some(member_fault::name(fault).to_owned());

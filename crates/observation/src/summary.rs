@@ -62,7 +62,7 @@ pub struct MemberSummary {
     pub ticks: u64,
     /// The farthest that the reference of any hand of the team went in a tick.
     pub hand_step_max_m: f64,
-    /// Norm of the row that has most, true and unfiltered.
+    /// Norm of the row that has most, true and unfiltered, once what was there at the start has had its 3 s to go.
     pub internal_peak_n: f64,
     /// Of the object, from its reference.
     pub object_peak_m: f64,

@@ -9,7 +9,17 @@ mod team;
 use mikoshi_ipc_types::{mode, stop_cause};
 use team::Team;
 
+/// The law is at work, and the wrenches' filter has settled.
+const STARTED: u64 = 200;
+
 impl Team {
+    fn started(overrides: &[(&str, &str)]) -> Self {
+        let mut team = Self::holding(overrides);
+        team.go_on(STARTED);
+        assert_eq!(team.team_state().team_mode, mode::CARRY);
+        team
+    }
+
     /// Goes on until some hand is left out, and says after how many ticks.
     fn go_on_until_a_loss(&mut self, most: u64) -> Option<u64> {
         (0..most).find(|_| {

@@ -12,8 +12,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-/// The law is at work, and the wrenches' filter has settled.
-const STARTED: u64 = 200;
 const STIFFNESS_N_M: f64 = 66e3;
 const STIFFNESS_NM_RAD: f64 = 850.0;
 
@@ -64,13 +62,6 @@ impl Team {
             obeys: false,
             run,
         }
-    }
-
-    pub fn started(overrides: &[(&str, &str)]) -> Self {
-        let mut team = Self::holding(overrides);
-        team.go_on(STARTED);
-        assert_eq!(team.team_state().team_mode, mode::CARRY);
-        team
     }
 
     pub fn team_state(&self) -> &TeamState {
