@@ -146,8 +146,8 @@ impl Team {
     }
 
     fn open_and_close(&mut self) {
-        let robots = self.run.robots.iter().zip(&self.out.commands).enumerate();
-        let told = robots.flat_map(|(_, (robot, command))| {
+        let robots = self.run.robots.iter().zip(&self.out.commands);
+        let told = robots.flat_map(|(robot, command)| {
             (0..robot.grasping_hands.len()).map(|hand| command.closed_hands >> hand & 1 != 0)
         });
         for (hand, shall_hold) in told.enumerate() {
