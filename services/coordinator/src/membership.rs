@@ -331,6 +331,8 @@ impl Memberships {
             stage::HALTING if team.rests => stage::UNBURDENING,
             stage::HALTING if lasted > halt => robot.give_up(fault::RESTLESS),
             stage::UNBURDENING if !shall_leave => stage::JOINING,
+            // Somebody else has lost the object meanwhile.
+            stage::UNBURDENING if !seen.is_spare => robot.give_up(fault::NEEDED),
             stage::UNBURDENING if robot.relieved >= 1.0 && bears_nothing => stage::OPENING,
             stage::UNBURDENING if lasted > patience => robot.give_up(fault::BURDENED),
             stage::OPENING if seen.none_holds => stage::WITHDRAWING,
@@ -666,6 +668,15 @@ mod tests {
         let back = [stage::WITHDRAWING, stage::LEAVING, stage::AWAY];
         assert_eq!((&stages[stages.len() - 3..], &changes[..]), (&back[..], &[][..]), "{stages:?}");
         assert_eq!(trial.fault(), fault::OUT_OF_REACH);
+    }
+
+    #[test]
+    fn who_is_needed_meanwhile_stays() {
+        let mut trial = Trial::new();
+        assert_eq!(trial.go_on(200, &WELL).0, [stage::HALTING, stage::UNBURDENING]);
+        let needed = Seen { is_spare: false, ..WELL };
+        assert_eq!(trial.go_on(2000, &needed), (vec![stage::JOINING, stage::MEMBER], vec![]));
+        assert_eq!(trial.fault(), fault::NEEDED);
     }
 
     #[test]
