@@ -440,7 +440,9 @@ impl World {
             for (index, hand) in robot.hands.iter_mut().enumerate() {
                 let bit = 1 << index;
                 let (holds, shall_hold) = (robot.holding & bit != 0, command.closed_hands & bit != 0);
-                if holds != shall_hold && (holds || hand.is_in_reach(&self.world, &robot.body, self.object, others_hold)) {
+                if holds != shall_hold
+                    && (holds || hand.is_in_reach(&self.world, &robot.body, self.object, others_hold))
+                {
                     robot.holding ^= bit;
                     if shall_hold && others_hold {
                         hand.take_hold(&self.world, &robot.body, self.object);
