@@ -20,6 +20,7 @@ mod grasp;
 pub mod hosts;
 mod job;
 mod load;
+mod membership;
 mod motion;
 mod nearest;
 mod operator;

@@ -41,7 +41,7 @@ pub struct RobotSpec {
 /// Opens every encoded run.
 const MAGIC: [u8; 8] = *b"MIKOSHI\0";
 /// Counts changes of the schema.
-const SCHEMA_VERSION: u32 = 14;
+const SCHEMA_VERSION: u32 = 15;
 /// Sixteen robots with a megabyte of URDF each fit four times; a decoder claims no more memory.
 const MAX_BYTES: usize = 64 << 20;
 /// Magic, version, BLAKE3 of what follows.

@@ -4,6 +4,7 @@ pub use crate::coordination::{Coordination, Policy};
 pub use crate::grasp::Grasp;
 pub use crate::hosts::{Host, Link};
 pub use crate::job::Job;
+pub use crate::membership::Membership;
 pub use crate::motion::{Motion, RandomMotion, Segment};
 pub use crate::operator::{DriveLimits, Operator, OperatorEvent, OperatorWord, Squeeze};
 pub use crate::sharing::LoadSharing;
@@ -56,6 +57,9 @@ pub struct Scenario {
     /// The whole job, from open hands to open hands; without, hands hold the object from tick 0 on.
     #[serde(default)]
     pub job: Option<Job>,
+    /// Robots that leave while the team carries, or join.
+    #[serde(default)]
+    pub membership: Vec<Membership>,
     /// How the object is asked to move; it stays when absent.
     #[serde(default)]
     pub motion: Option<Motion>,
@@ -154,9 +158,19 @@ impl Scenario {
             .or(moved.map(|motion| [motion.acceleration_m_s2, motion.angular_acceleration_rad_s2]))
     }
 
-    /// Whether hands hold the object at tick 0.
-    pub fn begins_closed(&self) -> bool {
-        self.job.is_none()
+    /// Whether the hands of this robot hold the object at tick 0.
+    pub fn begins_closed(&self, robot: &str) -> bool {
+        self.job.is_none() && !self.begins_away(robot)
+    }
+
+    /// Whether this robot is to join the others later.
+    pub fn begins_away(&self, robot: &str) -> bool {
+        self.membership_of(robot).next().is_some_and(Membership::begins_away)
+    }
+
+    /// When this robot leaves and joins, in the order of time.
+    pub fn membership_of<'a>(&'a self, robot: &'a str) -> impl Iterator<Item = &'a Membership> {
+        self.membership.iter().filter(move |entry| entry.robot == robot)
     }
 
     /// Number of physics steps in a tick.

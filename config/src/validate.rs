@@ -2,6 +2,7 @@
 
 mod checks;
 mod hosts;
+mod membership;
 mod operator;
 mod robot;
 mod scenario;

@@ -659,6 +659,35 @@ fn a_grasp_failure_of_nobody_or_with_a_friction_that_shakes_the_object_is_refuse
 }
 
 #[test]
+fn who_leaves_is_of_the_team_goes_and_comes_by_turns_and_leaves_enough_to_carry() {
+    let says = |entries: &str| {
+        let root = fixture();
+        text_of(root.path(), load(root.path(), &[&format!("membership=[{entries}]")]))
+    };
+    for (entries, key, expected) in [
+        (r#"{robot = "Z", leave_s = 1.0}"#, "membership.0.robot: found \"Z\"", "a robot of the team"),
+        (r#"{robot = "L"}"#, "membership.0.leave_s: found neither", "a time to leave"),
+        (r#"{robot = "L", leave_s = 2.0, join_s = 1.0}"#, "membership.0.join_s: found 1", "a time later"),
+        (r#"{robot = "L", leave_s = 1.0}, {robot = "L", leave_s = 2.0}"#, "membership.1.leave_s", "by turns"),
+        (
+            r#"{robot = "L", leave_s = 1.0, distance_m = 9.0}"#,
+            "membership.0.distance_m: found 9",
+            "at most 5",
+        ),
+        (
+            r#"{robot = "L", leave_s = 1.0, speed_m_s = 0.0}"#,
+            "membership.0.speed_m_s: found 0",
+            "more than 0",
+        ),
+        (r#"{robot = "L", leave_s = 1.0}"#, "membership.0.leave_s: found 1 robots", "at least 2"),
+        (r#"{robot = "L", leave_s = 1.0, when = 3.0}"#, "membership.0.when", "unknown key"),
+    ] {
+        let told = says(entries);
+        assert!(told.contains(key) && told.contains(expected), "{entries}: {told}");
+    }
+}
+
+#[test]
 fn a_team_whose_internal_forces_are_not_formed_anew_does_not_carry_on() {
     let root = fixture();
     let options = ["safety.lost_grasp=carry-on", "hybrid.internal_forces=chain"];

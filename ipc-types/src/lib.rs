@@ -29,6 +29,6 @@ pub use limits::{
 pub use operator::{Drive, OperatorInput, Push};
 pub use payloads::{
     JointCommand, ObjectTruth, PoseWire, RobotState, RobotTruth, Sensors, TeamCommand, TeamState, TwistWire,
-    WrenchWire, all_hands, flag, mode, stop_cause,
+    WrenchWire, all_hands, flag, member_fault, member_stage, mode, stop_cause,
 };
 pub use service::ServiceId;

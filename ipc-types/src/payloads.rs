@@ -100,6 +100,85 @@ pub mod stop_cause {
     }
 }
 
+/// How far a robot is on its way out of the team or into it, as `TeamState::member_stage` carries it.
+pub mod member_stage {
+    /// It carries with the others.
+    pub const MEMBER: u64 = 0;
+    /// It is to leave: the object comes to rest, and feet stand.
+    pub const HALTING: u64 = 1;
+    /// Its hands hold, and leave what they bear to the others.
+    pub const UNBURDENING: u64 = 2;
+    /// Its hands open; it takes no part from now on.
+    pub const OPENING: u64 = 3;
+    /// Its open hands draw back.
+    pub const WITHDRAWING: u64 = 4;
+    /// It walks off.
+    pub const LEAVING: u64 = 5;
+    /// It stands aside.
+    pub const AWAY: u64 = 6;
+    /// It walks to where it can come straight to its place.
+    pub const RETURNING: u64 = 7;
+    /// It walks up to its place; the object rests.
+    pub const APPROACHING: u64 = 8;
+    /// Its open hands come to the object.
+    pub const REACHING: u64 = 9;
+    /// Its hands close.
+    pub const CLOSING: u64 = 10;
+    /// Its hands hold, and take on what they are to bear.
+    pub const JOINING: u64 = 11;
+
+    /// What people call a stage.
+    pub const fn name(stage: u64) -> &'static str {
+        match stage {
+            MEMBER => "member",
+            HALTING => "halting",
+            UNBURDENING => "unburdening",
+            OPENING => "opening",
+            WITHDRAWING => "withdrawing",
+            LEAVING => "leaving",
+            AWAY => "away",
+            RETURNING => "returning",
+            APPROACHING => "approaching",
+            REACHING => "reaching",
+            CLOSING => "closing",
+            JOINING => "joining",
+            _ => "unknown",
+        }
+    }
+}
+
+/// Why a robot could not leave or join, as `TeamState::member_fault` carries it.
+pub mod member_fault {
+    /// Object or feet did not come to rest.
+    pub const RESTLESS: u64 = 1;
+    /// Without it too few hands would hold the object.
+    pub const NEEDED: u64 = 2;
+    /// Its hands still bore something when they should not.
+    pub const BURDENED: u64 = 3;
+    /// Its hands did not open.
+    pub const HOLDING: u64 = 4;
+    /// It did not get away as far as it should.
+    pub const STRANDED: u64 = 5;
+    /// It did not come to its place.
+    pub const OUT_OF_REACH: u64 = 6;
+    /// Its hands did not take hold.
+    pub const NOT_HOLDING: u64 = 7;
+
+    /// Its code in summaries.
+    pub const fn name(fault: u64) -> &'static str {
+        match fault {
+            RESTLESS => "member-restless",
+            NEEDED => "member-needed",
+            BURDENED => "member-burdened",
+            HOLDING => "member-holding",
+            STRANDED => "member-stranded",
+            OUT_OF_REACH => "member-out-of-reach",
+            NOT_HOLDING => "member-not-holding",
+            _ => "unknown",
+        }
+    }
+}
+
 /// The first `count` hands, as sets of hands travel: bit h for grasping hand h.
 pub const fn all_hands(count: usize) -> u64 {
     let count = if count < MAX_HANDS { count } else { MAX_HANDS };
@@ -312,6 +391,14 @@ payload! {
         pub load_share: [f64; MAX_ROBOTS],
         /// To which part hands are relieved of the moments that zero internal forces bring: 0 not at all, 1 wholly.
         pub load_relief: f64,
+        /// How far each robot is on its way out of the team or into it: one of [`member_stage`].
+        pub member_stage: [u64; MAX_ROBOTS],
+        /// Why it could not leave or join when it was last to: one of [`member_fault`], 0 if it could.
+        pub member_fault: [u64; MAX_ROBOTS],
+        /// Of what is borne, the part of a whole member's that each robot is asked for, 0 to 1.
+        pub member_weight: [f64; MAX_ROBOTS],
+        /// Bit i: hand i of the team takes no part because its robot is away, and has not lost the object.
+        pub away_hands: u64,
     }
 }
 

@@ -14,6 +14,8 @@ pub struct GraspSite {
     pub site: String,
     /// Where the palm is at tick 0, displaced by the grasp offset along the object's axes.
     pub pose_in_object: Isometry3<f64>,
+    /// Whether the hand holds at tick 0.
+    pub begins_closed: bool,
 }
 
 /// The grasps of all robots' grasping hands, in hand order.
@@ -26,6 +28,7 @@ pub fn sites(scenario: &Scenario, robots: &[Robot]) -> Vec<GraspSite> {
             site: qualified(OBJECT, &palm),
             palm,
             pose_in_object,
+            begins_closed: scenario.begins_closed(robot.name()),
         };
         palms.zip(poses).map(site).collect::<Vec<_>>()
     };

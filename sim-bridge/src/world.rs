@@ -2,7 +2,7 @@
 
 use crate::failures::GraspFailures;
 use crate::grasp::{self, GraspSite};
-use crate::grip;
+use crate::grip::{self, Taken};
 use crate::layout::{HandLayout, Layout};
 use crate::object_body::ObjectBodies;
 use crate::pose::{site_pose, site_twist};
@@ -54,6 +54,8 @@ struct State {
     commands: Box<[JointCommand]>,
     /// The hands of each robot that hold the object: bit h for hand h.
     holding: Box<[u64]>,
+    /// Where they have taken hold.
+    taken: Box<[Taken]>,
     /// The readings of the last `depth` ticks of each robot, tick k at place k mod `depth`.
     readings: Box<[Sensors]>,
     robots: Box<[RobotTruth]>,
@@ -142,12 +144,16 @@ impl Physics for World {
         let state_size = model.state_size(INTEGRATION);
         let mut data = MjData::try_new(Box::new(model)).map_err(rejects)?;
 
-        let closed_hands = |hands| if scenario.begins_closed() { all_hands(hands) } else { 0 };
+        let closed_hands = |robot: usize, hands: usize| match robots.get(robot) {
+            Some(robot) if scenario.begins_closed(robot.name()) => all_hands(hands),
+            _ => 0,
+        };
         let mut commands = vec![bytemuck::Zeroable::zeroed(); robots.len()].into_boxed_slice();
         let postures = run.robots.iter().map(|robot| &robot.initial_posture_rad);
-        for ((layout, posture), command) in layout.robots.iter().zip(postures).zip(&mut commands) {
+        let described = layout.robots.iter().zip(postures).zip(&mut commands).enumerate();
+        for (robot, ((layout, posture), command)) in described {
             let command: &mut JointCommand = command;
-            command.closed_hands = closed_hands(layout.hands.len());
+            command.closed_hands = closed_hands(robot, layout.hands.len());
             for (index, (joint, angle_rad)) in layout.joints.iter().zip(posture).enumerate() {
                 data.qpos_mut()[joint.qpos] = *angle_rad;
                 data.ctrl_mut()[joint.actuator] = *angle_rad;
@@ -157,8 +163,9 @@ impl Physics for World {
         let depth = scenario.sensors.delay_ticks as usize + 1;
         let state = State {
             tick: 0,
+            holding: commands.iter().map(|command| command.closed_hands).collect(),
             commands,
-            holding: layout.robots.iter().map(|robot| closed_hands(robot.hands.len())).collect(),
+            taken: vec![bytemuck::Zeroable::zeroed(); robots.len()].into(),
             readings: vec![bytemuck::Zeroable::zeroed(); robots.len() * depth].into(),
             robots: vec![bytemuck::Zeroable::zeroed(); robots.len()].into(),
             object: bytemuck::Zeroable::zeroed(),
@@ -252,13 +259,16 @@ impl Physics for World {
         if !values.into_iter().all(|value| value.is_finite()) {
             return Err(StepWorldError::NotFinite);
         }
-        let State { tick, holding, pushes, .. } = &mut self.state;
+        let State { tick, holding, taken, pushes, .. } = &mut self.state;
         if self.bodies.turn_to(*tick, &mut self.data) {
+            grip::restore(&mut self.data, &self.layout, taken);
             self.data.step1();
         }
         self.push_script.begin(pushes, *tick);
         let is_pushed = are_active(pushes, *tick);
-        grip::close_and_open(&mut self.data, &self.layout, commands, holding);
+        let failures = &self.failures;
+        let has_failed = |robot, hand| failures.of_hand(*tick, robot, hand).is_some();
+        grip::close_and_open(&mut self.data, &self.layout, commands, (holding, taken), has_failed);
         self.failures.undo(*tick, &mut self.data, &self.layout, holding);
         self.scratch.tallies.fill(Tally::empty());
         self.scratch.contacts = Contacts::default();
@@ -292,11 +302,12 @@ impl Physics for World {
     }
 
     fn checkpoint_size(&self) -> usize {
-        let State { tick, commands, holding, readings, robots, object, pushes } = &self.state;
+        let State { tick, commands, holding, taken, readings, robots, object, pushes } = &self.state;
         size_of_val(&*self.scratch.simulator_state)
             + size_of_val(tick)
             + size_of_val(&**commands)
             + size_of_val(&**holding)
+            + size_of_val(&**taken)
             + size_of_val(&**readings)
             + size_of_val(&**robots)
             + size_of_val(object)
@@ -320,6 +331,7 @@ impl Physics for World {
             return Err(rejected);
         }
         self.bodies.turn_to(self.state.tick, &mut self.data);
+        grip::restore(&mut self.data, &self.layout, &self.state.taken);
         self.data.step1();
         Ok(())
     }
@@ -474,12 +486,13 @@ impl World {
 
 impl State {
     /// All parts of a checkpoint as bytes, the simulator's first.
-    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 8] {
+    fn parts<'a>(&'a mut self, simulator: &'a mut [f64]) -> [&'a mut [u8]; 9] {
         [
             bytemuck::cast_slice_mut(simulator),
             bytemuck::bytes_of_mut(&mut self.tick),
             bytemuck::cast_slice_mut(&mut self.commands),
             bytemuck::cast_slice_mut(&mut self.holding),
+            bytemuck::cast_slice_mut(&mut self.taken),
             bytemuck::cast_slice_mut(&mut self.readings),
             bytemuck::cast_slice_mut(&mut self.robots),
             bytemuck::bytes_of_mut(&mut self.object),

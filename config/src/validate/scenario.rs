@@ -1,7 +1,7 @@
 //! Scenarios: periods that divide each other, teams that agree with their models, gains in range.
 
 use super::checks::{Checks, Violation};
-use super::{hosts, operator};
+use super::{hosts, membership, operator};
 use crate::robot::RobotConfig;
 use crate::scenario::{
     Control, Grasp, Ground, InternalForces, Job, LostGrasp, Member, Motion, Policy, PushEvent, Scenario,
@@ -79,6 +79,7 @@ pub(crate) fn scenario(scenario: &Scenario, configs: &[&RobotConfig]) -> Vec<Vio
         format_args!("more than 0, at most {MAX_LIFT_M} m"),
     );
     safety(&mut checks, scenario);
+    membership::membership(&mut checks, scenario);
     load(&mut checks, scenario);
     operator::operator(&mut checks, scenario);
     hosts::hosts(&mut checks, scenario);

@@ -4,7 +4,10 @@ use crate::canonical::Observation;
 use crate::course::Course;
 use crate::internal::{InternalFigures, raise};
 use crate::load::LoadFigures;
-use crate::summary::{InternalSummary, LoadSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary};
+use crate::members::MemberFigures;
+use crate::summary::{
+    InternalSummary, LoadSummary, MemberSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary,
+};
 use crate::truth::{FootTracker, ObjectTracker, TrackedObject};
 use mikoshi_ipc_types::{MAX_FEET, MAX_JOINTS, ObjectTruth, RobotState, RobotTruth, mode};
 use mikoshi_spatial::{Object, Pose, World};
@@ -62,6 +65,7 @@ pub struct Figures {
     run: ObservedRun,
     internal: InternalFigures,
     load: LoadFigures,
+    members: MemberFigures,
     tracker: ObjectTracker,
     modes: Vec<(u64, u64)>,
     object: ObjectFigures,
@@ -85,6 +89,7 @@ pub struct JudgedFigures {
     pub modes: Vec<ModeSummary>,
     pub minutes: Vec<MinuteSummary>,
     pub load: LoadSummary,
+    pub members: Vec<MemberSummary>,
 }
 
 impl Figures {
@@ -98,6 +103,10 @@ impl Figures {
             tracker: ObjectTracker::new(&run),
             internal: InternalFigures::new(&run),
             load: LoadFigures::default(),
+            members: MemberFigures::new(
+                run.control_period_s,
+                run.robots.iter().map(|robot| (robot.name.clone(), robot.hands)),
+            ),
             course: Course::new(run.control_period_s),
             run,
             modes: vec![],
@@ -118,6 +127,7 @@ impl Figures {
             self.object.observe_end(&observation.object_truth.payload);
         }
         let team_state = &observation.team_state.payload;
+        self.members.observe(observation, &object);
         self.internal.observe(observation.tick(), object.internal, team_state);
         self.load.observe(observation.tick(), team_state);
         if self.modes.last().is_none_or(|(mode, _)| *mode != team_state.team_mode) {
@@ -169,6 +179,7 @@ impl Figures {
                 .collect(),
             internal: self.internal.finish(),
             load: self.load.finish(period_s),
+            members: self.members.finish(),
             unintended_contact_ticks: self.unintended_contact_ticks,
         }
     }

@@ -15,6 +15,7 @@ mod latency;
 mod load;
 mod log;
 mod longest;
+mod members;
 mod reader;
 mod summary;
 mod support;
@@ -22,7 +23,7 @@ mod tap;
 mod truth;
 
 pub use canonical::{LogHash, Observation, Observed, PayloadRef};
-pub use events::{Event, Events, safe_stop_text};
+pub use events::{Event, Events, lost_hands, safe_stop_text};
 pub use figures::{Figures, JudgedFigures, ObservedJoint, ObservedRobot, ObservedRun};
 pub use freshness::Freshness;
 pub use latency::{LateTick, LatencyFigures, PhaseTimes, Span, SpanSummary, WorstTick, times_ns};
@@ -30,8 +31,8 @@ pub use log::{ChannelSchema, LogWriter, WriteLogError};
 pub use longest::{LongestTimes, ServoTimes};
 pub use reader::{LogReader, ReadLogError, Revision, read_revisions};
 pub use summary::{
-    Fault, InternalSummary, LoadSummary, MinuteSummary, ModeSummary, ObjectSummary, RobotSummary, Summary,
-    Swap, Timing,
+    Fault, InternalSummary, LoadSummary, MemberSummary, MinuteSummary, ModeSummary, ObjectSummary,
+    RobotSummary, Summary, Swap, Timing,
 };
 pub use support::true_support;
 pub use tap::TeamTap;

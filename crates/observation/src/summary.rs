@@ -46,6 +46,28 @@ pub struct Summary {
     /// What is carried, as the team knew it last.
     #[serde(default)]
     pub load: LoadSummary,
+    /// Robots that left the team or joined it, stage by stage; empty where nobody did.
+    #[serde(default)]
+    pub members: Vec<MemberSummary>,
+}
+
+/// A stage of a robot on its way out of the team or into it, or as a member between, and what was largest while it lasted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct MemberSummary {
+    pub robot: String,
+    pub stage: String,
+    /// The first one.
+    pub tick: u64,
+    pub ticks: u64,
+    /// The farthest that the reference of any hand of the team went in a tick.
+    pub hand_step_max_m: f64,
+    /// Norm of the row that has most, true and unfiltered, once what was there at the start has had its 3 s to go.
+    pub internal_peak_n: f64,
+    /// Of the object, from its reference.
+    pub object_peak_m: f64,
+    /// Why it did not go on as it was asked to.
+    pub fault: Option<String>,
 }
 
 /// What is carried, in the object's axes, by hands' wrenches and motion; standard deviations beside. All zero where nobody

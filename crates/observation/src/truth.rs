@@ -81,6 +81,8 @@ pub struct ObjectTracker {
     is_uncontrolled: bool,
     X_BodyA: Option<Pose<Object, Object>>,
     sticks: Vec<VirtualStick>,
+    /// The hands that took no part in the last tick, as a set.
+    absent: u64,
 }
 
 /// A row of C when some hands take no part any more, a set in hand order. Only rows of a tree lose hands: between what is
@@ -122,6 +124,7 @@ impl ObjectTracker {
             is_uncontrolled: !run.is_controlled,
             X_BodyA: None,
             sticks: Vec::new(),
+            absent: 0,
         }
     }
 
@@ -179,6 +182,14 @@ impl ObjectTracker {
         let hands: Vec<_> = hands.collect();
         if is_hybrid && self.sticks.is_empty() {
             self.sticks = hands.iter().map(|(X_WH, _)| VirtualStick::at_grasp(X_WH, X_WA)).collect();
+        }
+        // Who has come holds where he is.
+        let absent = observation.team_state.payload.absent_hands;
+        let came = core::mem::replace(&mut self.absent, absent) & !absent;
+        for (hand, (stick, (X_WH, _))) in self.sticks.iter_mut().zip(&hands).enumerate() {
+            if came >> hand & 1 != 0 {
+                *stick = VirtualStick::at_grasp(X_WH, X_WA);
+            }
         }
         let stick = |hand: usize, X_WH: &Pose<World, Hand>| {
             self.sticks.get(hand).copied().unwrap_or_else(|| VirtualStick::at_grasp(X_WH, X_WA))

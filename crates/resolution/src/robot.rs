@@ -100,11 +100,17 @@ pub(crate) fn resolve_robot(
         }
         settled = settle(&targets)?;
     }
+    let mut X_WB = base_pose(&usable.robot, &settled, &targets);
+    if let Some(entry) =
+        scenario.scenario.membership_of(&member.name).next().filter(|entry| entry.begins_away())
+    {
+        X_WB.translation -= X_WG.rotation * Vector3::new(entry.distance_m, 0.0, 0.0);
+    }
     Ok(RobotSpec {
         member: member.clone(),
         config: config.clone(),
         urdf: usable.loaded.urdf.clone(),
-        initial_base_pose: base_pose(&usable.robot, &settled, &targets).to_array(),
+        initial_base_pose: X_WB.to_array(),
         initial_posture_rad: settled,
         grasping_hands,
         hand_in_object,

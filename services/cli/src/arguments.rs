@@ -328,6 +328,10 @@ pub enum Command {
     /// Push a robot or the object of a simulated run
     #[command(after_help = PUSH_EXAMPLES)]
     Push(PushArguments),
+    /// Have a robot let go and walk off while the others carry
+    Leave(MembershipArguments),
+    /// Have a robot that has left walk up and take hold again
+    Join(MembershipArguments),
     /// Change gains, limits and references of a run that goes on
     #[command(after_help = SET_EXAMPLES)]
     Set(SetArguments),
@@ -387,6 +391,7 @@ impl Command {
             Self::Stop(arguments) | Self::Resume(arguments) => arguments.json,
             Self::Drive(arguments) => arguments.json,
             Self::Push(arguments) => arguments.json,
+            Self::Leave(arguments) | Self::Join(arguments) => arguments.json,
             Self::Set(arguments) => arguments.json,
             Self::Soak(arguments) => arguments.json,
             Self::Latency(arguments) => arguments.json,
@@ -667,6 +672,20 @@ pub struct PushArguments {
     /// For how many seconds of the run
     #[arg(long = "for", value_name = "S")]
     pub for_s: f64,
+    /// The run, as `mikoshi status` names it [default: the only one]
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<String>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mikoshi leave` and `mikoshi join`.
+#[derive(Args, Debug)]
+pub struct MembershipArguments {
+    /// The robot's name
+    #[arg(value_name = "ROBOT")]
+    pub robot: String,
     /// The run, as `mikoshi status` names it [default: the only one]
     #[arg(long, value_name = "RUN")]
     pub run: Option<String>,

@@ -47,6 +47,13 @@ pub enum Request {
         /// Keys and values in place of the run's.
         set: Vec<(String, String)>,
     },
+    /// A robot leaves the team, or joins it.
+    Membership {
+        /// Its name.
+        robot: String,
+        /// Whether it leaves.
+        leaves: bool,
+    },
     /// The team stops, and stands.
     Stop,
     /// The team goes on after a safe stop.

@@ -4,7 +4,9 @@ use mikoshi_config::Scenario;
 use mikoshi_config::scenario::{AxisControl, Control, Thresholds};
 use mikoshi_cooperation::OBJECT_ROW;
 use mikoshi_ipc_types::mode;
-use mikoshi_observation::{InternalSummary, ModeSummary, ObjectSummary, RobotSummary, Summary};
+use mikoshi_observation::{
+    InternalSummary, MemberSummary, ModeSummary, ObjectSummary, RobotSummary, Summary,
+};
 use mikoshi_report::JudgedLimit;
 
 const GRAVITY_M_S2: f64 = 9.81;
@@ -62,6 +64,7 @@ fn judge(scenario: &Scenario, summary: &Summary) -> Judge {
     if scenario.job.is_some() {
         judge_job(&mut judge, &summary.modes);
     }
+    judge_members(&mut judge, &summary.members);
     for robot in &summary.robots {
         judge_robot(&mut judge, scenario, robot, summary.ticks);
     }
@@ -185,6 +188,21 @@ fn judge_job(judge: &mut Judge, modes: &[ModeSummary]) {
         }
         [.., last] => judge.fail(format!("the job is not done: the run ends in {last}")),
         [] => judge.fail("the job is not done: no tick was observed".to_owned()),
+    }
+}
+
+/// Who was asked to leave or to join has done so.
+fn judge_members(judge: &mut Judge, members: &[MemberSummary]) {
+    for (index, member) in members.iter().enumerate() {
+        let MemberSummary { robot, stage, .. } = member;
+        if let Some(fault) = &member.fault {
+            judge.fail(format!("{robot}, {stage}, did not go on as it was asked to: {fault}"));
+        }
+        let is_last = members.iter().skip(index + 1).all(|later| later.robot != *robot);
+        let is_settled = ["member", "away"].contains(&stage.as_str());
+        if is_last && !is_settled {
+            judge.fail(format!("{robot} is still {stage} in the end"));
+        }
     }
 }
 

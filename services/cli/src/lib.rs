@@ -23,6 +23,7 @@ pub mod interrupts;
 mod judge;
 mod latency;
 mod meals;
+mod membership;
 mod observed_run;
 pub mod observer;
 mod orphans;
@@ -78,6 +79,8 @@ pub fn main_of_command() -> ExitCode {
         Command::Resume(arguments) => commands::operator::resume(arguments).map(|()| Status::Met),
         Command::Drive(arguments) => drive::drive(arguments),
         Command::Push(arguments) => commands::push::push(arguments).map(|()| Status::Met),
+        Command::Leave(arguments) => commands::membership::leave(arguments).map(|()| Status::Met),
+        Command::Join(arguments) => commands::membership::join(arguments).map(|()| Status::Met),
         Command::Set(arguments) => commands::set::set(arguments).map(|()| Status::Met),
         Command::Soak(arguments) => soak::soak(arguments),
         Command::Latency(arguments) => latency::latency(arguments),

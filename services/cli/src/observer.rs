@@ -17,6 +17,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
 use mikoshi_observation::{
     Fault, Figures, Freshness, LatencyFigures, LogHash, Observation, Summary, Swap, Timing, WriteLogError,
+    lost_hands,
 };
 use mikoshi_process::journal::{self, About, Severity};
 use mikoshi_recording::Recording;
@@ -268,6 +269,7 @@ impl RunObserver {
             drift_between_robots_m: figures.drift_between_robots_m,
             minutes: figures.minutes,
             load: figures.load,
+            members: figures.members,
             unintended_contact_ticks: figures.unintended_contact_ticks,
             timing: Timing {
                 ticks_held: self.freshness.ticks_held(),
@@ -314,7 +316,8 @@ impl Stops {
     }
 
     fn observe_hands(&mut self, tick: u64, team: &TeamState) {
-        let lost = team.absent_hands & !core::mem::replace(&mut self.absent_hands, team.absent_hands);
+        let lost = lost_hands(team);
+        let lost = lost & !core::mem::replace(&mut self.absent_hands, lost);
         let left = self.hands.len() as u32 - team.absent_hands.count_ones();
         let code = stop_cause::name(team.loss_cause);
         for (_, (robot, hand)) in self.hands.iter().enumerate().filter(|(index, _)| lost >> index & 1 != 0) {

@@ -3,6 +3,7 @@
 
 use crate::children::Children;
 use crate::control::{Client, Control, Request};
+use crate::membership::asked_from;
 use crate::observer::RunObserver;
 use crate::outcome::{label_of, service_named, swap_of};
 use crate::revise::{may_be_set, revise};
@@ -86,6 +87,18 @@ impl Requests {
                     Err(message) => client.refuse(message),
                 }
             }
+            Some((Request::Membership { robot, leaves }, client)) => {
+                match self.begin_membership(run, board, children, &robot, leaves) {
+                    Ok((service, epoch, revised)) => {
+                        let settings = Some(match leaves {
+                            true => format!("{robot} is asked to leave"),
+                            false => format!("{robot} is asked to join"),
+                        });
+                        self.pending.push(Pending { service, epoch, client, revised, settings });
+                    }
+                    Err(message) => client.refuse(message),
+                }
+            }
             Some((Request::Push { on, force_n, for_s }, client)) => {
                 match self.begin_push(run, board, &on, force_n, for_s) {
                     Ok((number, told)) => self.push = Some(PendingPush { number, client, told }),
@@ -151,6 +164,21 @@ impl Requests {
     fn free_spec(&self) -> PathBuf {
         let named = |number| self.run_directory.join(format!("run-{number}.bin"));
         (1_u32..).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(0))
+    }
+
+    fn begin_membership(
+        &mut self,
+        run: &RunSpec,
+        board: &Board,
+        children: &mut Children,
+        robot: &str,
+        leaves: bool,
+    ) -> Result<(ServiceId, u64, Option<RunSpec>), String> {
+        let current = children.variant(service_named(run, COORDINATOR)?).spec;
+        let current = current.as_deref().map(read_spec).transpose().map_err(|error| error.to_string())?;
+        let tick = board.last_position(ServiceId::Bridge).map_or(0, |position| position.tick);
+        let set = [asked_from(current.as_ref().unwrap_or(run), robot, leaves, tick)?];
+        self.begin(run, board, children, COORDINATOR, &set, None, may_be_set)
     }
 
     fn begin_push(

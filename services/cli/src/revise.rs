@@ -35,7 +35,7 @@ pub fn revise(run: &RunSpec, overrides: &[(String, String)]) -> Result<RunSpec, 
 
 /// What the coordinator alone reads, and goes on with in the middle of a run: gains, limits, references of forces.
 /// A `*` stands for any one part of a key.
-const SETTABLE: [&str; 30] = [
+const SETTABLE: [&str; 36] = [
     "hybrid.kz",
     "hybrid.loop_gain",
     "hybrid.hand_stiffness_n_m",
@@ -56,6 +56,12 @@ const SETTABLE: [&str; 30] = [
     "safety.slip_rad",
     "safety.slip_ticks",
     "safety.lost_grasp",
+    "membership.*",
+    "membership.*.leave_s",
+    "membership.*.join_s",
+    "membership.*.distance_m",
+    "membership.*.speed_m_s",
+    "membership.*.draw_back_m",
     "operator.drive.timeout_s",
     "operator.drive.velocity_max_m_s",
     "operator.drive.vertical_max_m_s",
@@ -159,6 +165,9 @@ mod tests {
         ];
         assert_eq!(set("squeeze.toml", &settings), Ok(()));
         assert_eq!(set("drive.toml", &[("operator.drive.range_m", "2.0")]), Ok(()));
+        let leave = ("membership", r#"[{robot = "D", leave_s = 30.0, join_s = 60.0}]"#);
+        assert_eq!(set("drive.toml", &[leave]), Ok(()));
+        assert_eq!(set("members.toml", &[("membership.0.leave_s", "7.0")]), Ok(()));
     }
 
     #[test]

@@ -117,6 +117,18 @@ impl Grips {
         self.remember(state, hybrid, seen, &[Twist::zero(); MAX_HANDS_OF_TEAM]);
     }
 
+    /// Hands that have come: they hold now, and their grasps have yielded as they have.
+    pub(crate) fn take_in(&self, state: &mut GripState, came: u64, seen: &Seen<'_>) {
+        let R_AW = seen.X_WA.rotation.inverse();
+        let hands = state.yielded_at_start.iter_mut().zip(&mut state.slipping).zip(&mut state.open);
+        for (arm, (((yielded, slipping), open), wrench)) in hands.zip(seen.hand_wrench).enumerate() {
+            if came & 1 << arm != 0 {
+                *yielded = self.yielded(&R_AW, wrench).to_array();
+                (*slipping, *open) = (0, 0);
+            }
+        }
+    }
+
     /// The law was formed anew: what hands are off their grips by, in the world, is `gaps`.
     pub(crate) fn remember(
         &self,
@@ -215,11 +227,11 @@ impl Grips {
     }
 
     /// Whether hands that take part, but for those lost, are too few to carry anything between them.
-    pub(crate) fn are_too_few(&self, hybrid: &HybridState<MAX_HANDS_OF_TEAM>, loss: &Loss) -> bool {
+    pub(crate) fn are_too_few(&self, hybrid: &HybridState<MAX_HANDS_OF_TEAM>, gone: u64) -> bool {
         let mut arms = 0..0;
         let holds = |count: &&usize| {
             arms = arms.end..arms.end + **count;
-            arms.clone().any(|arm| hybrid.takes_part(arm) && loss.hands & 1 << arm == 0)
+            arms.clone().any(|arm| hybrid.takes_part(arm) && gone & 1 << arm == 0)
         };
         self.hands_of_robots.iter().filter(holds).count() < 2
     }

@@ -63,6 +63,7 @@ pub(crate) struct LoadScratch {
     tips: Vec<Wrench<World>>,
     rows: Vec<Wrench<World>>,
     work: Vec<Wrench<World>>,
+    shares: Vec<f64>,
 }
 
 impl LoadScratch {
@@ -72,6 +73,7 @@ impl LoadScratch {
             tips: vec![Wrench::zero(); arms],
             rows: vec![Wrench::zero(); arms],
             work: vec![Wrench::zero(); work],
+            shares: vec![0.0; arms],
         }
     }
 
@@ -79,6 +81,7 @@ impl LoadScratch {
     pub(crate) fn poison(&mut self) {
         let nan = Wrench::from_array(&[f64::NAN; 6]);
         [&mut self.tips, &mut self.rows, &mut self.work].into_iter().for_each(|buffer| buffer.fill(nan));
+        self.shares.fill(f64::NAN);
     }
 }
 
@@ -87,6 +90,23 @@ pub(crate) struct Holding<'a> {
     pub forces: FormedForces<'a>,
     pub hands: &'a [HandInput],
     pub sticks: &'a [[f64; 7]],
+    /// Of each hand, the part that it bears of what it would as a member's: less than 1 where its robot leaves or joins.
+    pub weights: &'a [f64],
+}
+
+impl Holding<'_> {
+    /// What each tip bears of the load if none is preferred: W⁻, by the hands' weights. Whether some hand bears less than it
+    /// would.
+    fn fill_shares(&self, shares: &mut [f64]) -> bool {
+        let formation = self.forces.formation();
+        let weights = self.weights.iter().zip(formation.w_inverse());
+        let sum: f64 = weights.clone().map(|(weight, share)| weight * share).sum();
+        let is_shifting = weights.clone().any(|(weight, share)| *share > 0.0 && *weight < 1.0) && sum > 0.0;
+        for (slot, (weight, share)) in shares.iter_mut().zip(weights) {
+            *slot = if is_shifting { weight * share / sum } else { *share };
+        }
+        is_shifting
+    }
 }
 
 impl Load {
@@ -143,31 +163,40 @@ impl Load {
             .iter()
             .map(|stick| VirtualStick { X_HB: Pose::from_array(stick).unwrap_or_else(Pose::identity) });
         let hands = holding.hands.iter().map(|hand| &hand.pose).zip(sticks);
-        let moment_nm = largest_moment_of_equal_tips_nm(&load, hands.clone(), formation.w_inverse());
+        let LoadScratch { tips, rows, work, shares } = scratch;
+        let is_shifting = holding.fill_shares(shares);
+        let moment_nm = largest_moment_of_equal_tips_nm(&load, hands.clone(), shares);
         state.relief = match self.hand_moment_nm > 0.0 {
             true => smooth_step(moment_nm / self.hand_moment_nm - 1.0),
             false => 1.0,
         };
-        if state.relief <= 0.0 {
+        if state.relief <= 0.0 && !is_shifting {
             return;
         }
-        let bearers = holding.hands.iter().zip(self.by_hand(state)).enumerate();
-        let bearers = bearers.map(|(arm, (hand, (weight, moment_nm)))| Bearer {
+        let bearers = holding.hands.iter().zip(self.by_hand(state)).zip(holding.weights).enumerate();
+        let bearers = bearers.map(|(arm, ((hand, (share, moment_nm)), weight))| Bearer {
             position_m: hand.pose.translation,
-            weight: if formation.takes_part(arm) { weight } else { 0.0 },
-            moment_nm,
+            weight: if formation.takes_part(arm) { share * weight } else { 0.0 },
+            moment_nm: moment_nm * *weight,
         });
-        let LoadScratch { tips, rows, work } = scratch;
         if !share_load(&load, &X_WA.translation, bearers, tips) {
             return;
         }
         for (tip, (pose, stick)) in tips.iter_mut().zip(hands) {
             *tip = stick.tip_wrench(pose, tip);
         }
+        let mut part = state.relief;
+        if is_shifting {
+            // As far as hands are not relieved tips bear the load alike, by weight: no internal force among equals.
+            for (tip, share) in tips.iter_mut().zip(shares.iter()) {
+                *tip = *tip * part + load * (*share * (1.0 - part));
+            }
+            part = 1.0;
+        }
         holding.forces.generalized_force(tips, rows, work);
         let X_AW = X_WA.inverse();
         for (force, row) in force.internal.iter_mut().zip(rows.iter().skip(1)) {
-            *force += row.expressed_in(&X_AW) * (state.relief * in_force);
+            *force += row.expressed_in(&X_AW) * (part * in_force);
         }
     }
 

@@ -6,6 +6,7 @@ use crate::grips::{self, GripState, Grips};
 use crate::job::{Job, Phase, PhaseWords, Seen};
 use crate::leading::{Leading, LeadingState};
 use crate::load::{Holding, Load, LoadScratch, LoadState};
+use crate::membership::{self, Change, MembershipState, Memberships};
 use crate::object_motion::{ObjectMotion, ObjectMotionState};
 use crate::odometry::{self, OdometryFrames, OdometryState};
 use crate::operator::{Operator, OperatorState};
@@ -20,8 +21,8 @@ use mikoshi_cooperation::{
 };
 use mikoshi_humanoid::gait::StepTiming;
 use mikoshi_ipc_types::{
-    Drive, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, OperatorInput, RobotState, TeamCommand, TeamState, mode,
-    operator, stop_cause,
+    Drive, MAX_HANDS, MAX_HANDS_OF_TEAM, MAX_ROBOTS, OperatorInput, RobotState, TeamCommand, TeamState,
+    all_hands, mode, operator, stop_cause,
 };
 use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -46,6 +47,7 @@ pub struct Coordinator {
     /// One robot leads; absent where the team is coordinated by symmetry.
     leading: Option<Leading>,
     load: Load,
+    memberships: Memberships,
     motion: ObjectMotion,
     timing: StepTiming,
     job: Job,
@@ -61,7 +63,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 7;
+pub(crate) const STATE_VERSION: u64 = 8;
 
 /// All that matters between ticks.
 #[repr(C)]
@@ -98,6 +100,8 @@ pub struct CoordinatorState {
     heard_drive: Drive,
     /// What is carried.
     load: LoadState,
+    /// Who is away, or on his way.
+    memberships: MembershipState,
 }
 
 // SAFETY: zeros are a valid value of integers and floats.
@@ -186,6 +190,7 @@ impl Coordinator {
             grips: Grips::new(scenario, hands_of_robots(run)),
             leading: Leading::new(run)?,
             load: Load::new(scenario, hands_of_robots(run)),
+            memberships: Memberships::new(scenario, hands_of_robots(run)),
             motion: ObjectMotion::new(run),
             timing: step_timing(scenario),
             motion_start_tick: scenario.motion.as_ref().map(|motion| scenario.tick_at(motion.start_s)),
@@ -205,8 +210,15 @@ impl Coordinator {
     /// # Errors
     /// More hands grasp than a team may have.
     pub fn initial_state(&self) -> Result<CoordinatorState, BuildCoordinatorError> {
+        let memberships = self.memberships.initial_state();
+        let mut hybrid = HybridState::at_grasp(&self.sticks)?;
+        for robot in (0..self.hands_of_robots.len()).filter(|&robot| memberships.is_led(robot)) {
+            let away = self.memberships.hands(robot);
+            let hands = hybrid.is_absent.iter_mut().enumerate();
+            hands.for_each(|(arm, is_absent)| *is_absent |= away >> arm & 1);
+        }
         Ok(CoordinatorState {
-            hybrid: HybridState::at_grasp(&self.sticks)?,
+            hybrid,
             motion: ObjectMotionState::at_rest(&Pose::identity()),
             clock: TeamClockState::default(),
             odometry: OdometryState::default(),
@@ -224,6 +236,7 @@ impl Coordinator {
             heard_word: 0,
             heard_drive: Drive::default(),
             load: LoadState::zeroed(),
+            memberships,
         })
     }
 
@@ -266,7 +279,9 @@ impl Coordinator {
         let present = self.grips.present(&state.hybrid);
         let X_WO = state.odometry.frames(self.hands_of_robots.len()).ok_or(CoordinateError::State)?;
         read_hands(robots.clone(), &self.hands_of_robots, &X_WO, hands)?;
-        let wishes = Wishes::of(robots.clone());
+        let in_step = robots.clone().enumerate();
+        let in_step = in_step.filter(|(robot, _)| state.memberships.own_clock(*robot).is_none());
+        let wishes = Wishes::of(in_step.map(|(_, robot)| robot));
 
         let phase = Phase::from_words(state.phase).ok_or(CoordinateError::State)?;
         let (mut safety, mut operator) = (state.safety, state.operator);
@@ -287,7 +302,8 @@ impl Coordinator {
         // Whoever drives does so from the beginning.
         let motion_start_tick = if self.operator.is_driven() { Some(0) } else { self.motion_start_tick };
         let is_moving = motion_ticks.zip(motion_start_tick).is_some_and(|(ticks, start)| ticks >= start);
-        let speed_share = if is_moving && !is_stopped { wishes.speed_share } else { 0.0 };
+        let may_move = is_moving && !is_stopped && !state.memberships.object_rests();
+        let speed_share = if may_move { wishes.speed_share } else { 0.0 };
         // State changes only when nothing can fail any more.
         let mut motion = state.motion;
         let X_WA_ref = match self.job.object_step_m(&phase, tick) {
@@ -321,10 +337,12 @@ impl Coordinator {
         self.operator.squeeze(&mut operator, tick, !is_hybrid || phase.is_resting());
         self.operator.add_squeeze(&operator, force_ref);
         let mut load = state.load;
+        let weights = self.memberships.weights(&state.memberships);
         let holding = Holding {
             forces: self.law.internal_forces().among(&team.formation),
             hands,
             sticks: &state.hybrid.sticks,
+            weights: &weights,
         };
         let in_force = self.references.share_in_force(since_start[1]);
         let bearers = robots.clone().zip(&X_WO);
@@ -353,6 +371,7 @@ impl Coordinator {
             forces: self.law.internal_forces().among(&team.formation),
             hands,
             sticks: &state.hybrid.sticks,
+            weights: &weights,
         };
         self.load.look(&mut load, &law_output.position.external, &holding, is_free && !is_blind);
         state.load = load;
@@ -360,12 +379,25 @@ impl Coordinator {
         state.hand_wrench.iter_mut().zip(&team.hand_wrench).for_each(|(kept, wrench)| *kept = *wrench);
         let hand_step_m = if is_stopped { 0.0 } else { self.job.hand_step_m(&phase, tick) };
         move_open_hands(state, &mut law_output.hands, hand_step_m);
+        let in_team = membership::Team {
+            tick,
+            phase: &phase,
+            X_WA_ref: &X_WA_ref,
+            rests: motion.twist == [0.0; 6] && clock.is_standing() && wishes.are_content(),
+            clock_stands: clock.is_standing(),
+        };
+        let references = (&mut law_output.hands[..], &mut state.hybrid.hand_pose_ref[..]);
+        self.memberships
+            .lead(&mut state.memberships, &in_team, robots.clone(), is_stopped || is_blind, references)
+            .and_then(|()| self.memberships.step(&mut state.memberships, &self.timing, robots.clone()))
+            .ok_or(CoordinateError::State)?;
 
         self.write_commands(tick, state, &phase, &X_WO, law_output, out);
         let reference = is_hybrid.then_some((&*force_ref, &*position_ref));
         write_team_state(state, &phase, law_output, reference, out);
         out.team_state.odometry_pose = X_WO.map(|X_WO| X_WO.to_array());
         out.team_state.speed_share = speed_share;
+        state.memberships.write(|robot| self.memberships.hands(robot), &mut out.team_state);
         state.load.write(&mut out.team_state);
         out.team_state.drive_silent_ticks = self.operator.silent_ticks(&state.operator, tick);
         out.team_state.awaited_word = self.job.awaited(&phase);
@@ -375,6 +407,9 @@ impl Coordinator {
         if carries && !is_blind {
             let now = Now { tick, law: law_output, hands, is_free };
             self.watch_grips(state, team, &now, robots.clone(), &mut out.team_state.hand_slip)?;
+            if !is_stopped {
+                self.go_on_leaving_and_joining(state, team, &now, &in_team, robots.clone())?;
+            }
         }
 
         if is_blind && !safety.is_blind() && carries {
@@ -385,6 +420,7 @@ impl Coordinator {
         }
         if is_stopped || is_blind {
             state.phase = phase.delayed().to_words();
+            state.memberships.delay();
             return Ok(());
         }
         let seen = self.look(state, hands, robots, &present, &wishes, law_output);
@@ -454,7 +490,7 @@ impl Coordinator {
         }
         let Some(loss) = self.grips.find_loss(grips, hybrid, hand_slip, robots) else { return Ok(()) };
         grips.loss_cause = loss.cause;
-        let are_too_few = self.grips.are_too_few(hybrid, &loss);
+        let are_too_few = self.grips.are_too_few(hybrid, loss.hands);
         let is_formed = !is_led && self.do_without(state, team, now, loss.hands)?;
         let is_blind = !is_led && !is_formed;
         if are_too_few {
@@ -463,6 +499,68 @@ impl Coordinator {
             state.safety.stop(loss.cause, loss.robot, is_blind);
         }
         Ok(())
+    }
+
+    /// Robots leave and join.
+    fn go_on_leaving_and_joining<'a>(
+        &self,
+        state: &mut CoordinatorState,
+        team: &mut TeamScratch,
+        now: &Now<'_>,
+        in_team: &membership::Team<'_>,
+        robots: impl Iterator<Item = &'a RobotState>,
+    ) -> Result<(), CoordinateError> {
+        for (robot, said) in robots.enumerate().filter(|(robot, _)| self.memberships.concerns(*robot)) {
+            let seen = self.look_at_member(state, now, robot, said);
+            let clock = state.clock;
+            let change = self.memberships.next(&mut state.memberships, robot, in_team, &seen, &clock);
+            let absent = grips::absent(&state.hybrid);
+            let hands = self.memberships.hands(robot);
+            match change {
+                None => {}
+                Some(Change::Leaves(_)) if self.form_for(state, team, now, absent | hands)? => {
+                    let references = &now.law.hands;
+                    self.memberships.let_go(&mut state.memberships, robot, in_team.X_WA_ref, references);
+                }
+                Some(Change::Joins(_)) if self.form_for(state, team, now, absent & !hands)? => {}
+                Some(Change::Leaves(_)) => self.memberships.stay(&mut state.memberships, robot),
+                Some(Change::Joins(_) | Change::Stuck(_)) => {
+                    state.safety.stop(stop_cause::GRASP, robot, false);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What decides how a robot goes on leaving or joining.
+    fn look_at_member(
+        &self,
+        state: &CoordinatorState,
+        now: &Now<'_>,
+        robot: usize,
+        said: &RobotState,
+    ) -> membership::Seen {
+        let wish = Wishes::of(core::iter::once(said));
+        let clock = state.memberships.own_clock(robot).unwrap_or(&state.clock);
+        let count = self.hands_of_robots.get(robot).copied().unwrap_or(0);
+        let hands = self.memberships.hands(robot);
+        let mut seen = membership::Seen {
+            stands: clock.is_standing() && wish.are_content(),
+            in_reach: true,
+            all_hold: grips::all_hold(said, all_hands(count)),
+            none_holds: said.holding_hands & all_hands(count) == 0,
+            is_spare: !self.grips.are_too_few(&state.hybrid, hands),
+            ..membership::Seen::default()
+        };
+        let arms = now.hands.iter().zip(&state.hand_wrench).enumerate();
+        for (hand, (_, (input, wrench))) in arms.filter(|(arm, _)| hands >> arm & 1 != 0).enumerate() {
+            let wrench = Wrench::<World>::from_array(wrench);
+            seen.force_n = seen.force_n.max(wrench.force.norm());
+            seen.moment_nm = seen.moment_nm.max(wrench.moment.norm());
+            let place = self.memberships.place(&state.memberships, (robot, hand), &now.law.position.external);
+            seen.in_reach &= place.is_some_and(|place| is_in_reach(&input.pose, &place));
+        }
+        seen
     }
 
     /// Forms the team anew without the lost hands, from the next tick on; false if it can't be.
@@ -474,30 +572,59 @@ impl Coordinator {
         lost: u64,
     ) -> Result<bool, CoordinateError> {
         let gone = grips::absent(&state.hybrid) | lost;
-        let stays = |arm: usize| gone & 1 << arm == 0;
-        if self.law.internal_forces().form(stays, &mut team.formation).is_err() {
+        if self.law.internal_forces().form(|arm| gone & 1 << arm == 0, &mut team.formation).is_err() {
             return Ok(false);
         }
         // Those who stay are seen off their grips by what the lost have brought into the mean: Σa is where they have it.
-        let mut off = [Twist::zero(); MAX_HANDS_OF_TEAM];
+        let mut off = gaps_of(team);
         let mut mean = Twist::zero();
-        for ((off, gap), share) in off.iter_mut().zip(&team.gaps).zip(team.formation.w_inverse()) {
-            *off = gap.map_or_else(Twist::zero, |gap| gap.tip);
+        for (off, share) in off.iter().zip(team.formation.w_inverse()) {
             mean += *off * *share;
         }
         off.iter_mut().for_each(|off| *off = *off - mean);
-        let X_WA = now.law.position.external.displaced(&mean);
+        self.form_anew(state, team, now, gone, (&off, &mean))
+    }
+
+    /// Forms the team anew for all hands but those that are `gone`, from the next tick on; false if it can't be. Nobody has
+    /// lost anything: Σa is where all have it.
+    fn form_for(
+        &self,
+        state: &mut CoordinatorState,
+        team: &mut TeamScratch,
+        now: &Now<'_>,
+        gone: u64,
+    ) -> Result<bool, CoordinateError> {
+        if self.law.internal_forces().form(|arm| gone & 1 << arm == 0, &mut team.formation).is_err() {
+            return Ok(false);
+        }
+        let off = gaps_of(team);
+        self.form_anew(state, team, now, gone, (&off, &Twist::zero()))
+    }
+
+    /// The same with Σa displaced by `mean`, from which hands are off their grips by `off`. The formation is made already.
+    fn form_anew(
+        &self,
+        state: &mut CoordinatorState,
+        team: &mut TeamScratch,
+        now: &Now<'_>,
+        gone: u64,
+        (off, mean): (&[Twist<World>; MAX_HANDS_OF_TEAM], &Twist<World>),
+    ) -> Result<bool, CoordinateError> {
+        let stays = |arm: usize| gone & 1 << arm == 0;
+        let came = grips::absent(&state.hybrid) & !gone;
+        let X_WA = now.law.position.external.displaced(mean);
         let grasp_yield = self.grasp_yield(state, team, now.hands, now.is_free)?;
         let X_WB = X_WA.displaced(&-grasp_yield);
         if self.law.reform(&mut state.hybrid, &mut team.law, &X_WB, now.hands, stays).is_err() {
             return Ok(false);
         }
         let seen = grips::Seen { X_WA: &X_WA, hands: now.hands, hand_wrench: &state.hand_wrench };
-        self.grips.remember(&mut state.grips, &state.hybrid, &seen, &off);
+        self.grips.take_in(&mut state.grips, came, &seen);
+        self.grips.remember(&mut state.grips, &state.hybrid, &seen, off);
         // References begin with what is there (ADR 0010), and the object's with the error that there was.
         state.force_at_start = state.hybrid.filtered_force;
         let since = now.tick.saturating_sub(state.formed_since);
-        state.off_at_start = (self.references.off_after(since, &state.off_at_start) + mean).to_array();
+        state.off_at_start = (self.references.off_after(since, &state.off_at_start) + *mean).to_array();
         state.formed_since = now.tick + 1;
         state.operator.squeeze_n = 0.0;
         Ok(true)
@@ -540,19 +667,18 @@ impl Coordinator {
     ) -> Seen {
         let is_in_reach = |(hand, stick): (&HandInput, &VirtualStick)| {
             // At the grasp the stick's tip coincides with the object's frame.
-            let place = self.X_WA_start * stick.X_HB.inverse().relabel::<Object, Hand>();
-            let way = hand.pose.translation - place.translation;
-            way.norm() <= REACH_M && place.displacement_to(&hand.pose).angular.norm() <= REACH_RAD
+            is_in_reach(&hand.pose, &(self.X_WA_start * stick.X_HB.inverse().relabel::<Object, Hand>()))
         };
         let mut holding = robots.clone().zip(present);
         Seen {
             in_reach: hands.iter().zip(&self.sticks).all(is_in_reach),
             all_hold: holding.all(|(robot, &present)| grips::all_hold(robot, present)),
             none_holds: robots.clone().all(|robot| robot.holding_hands == 0),
-            motion_is_over: match self.operator.is_driven() {
-                true => state.operator.asked == operator::LOWER && state.motion.twist == [0.0; 6],
-                false => self.motion.is_over(&state.motion),
-            },
+            motion_is_over: state.memberships.is_settled()
+                && match self.operator.is_driven() {
+                    true => state.operator.asked == operator::LOWER && state.motion.twist == [0.0; 6],
+                    false => self.motion.is_over(&state.motion),
+                },
             team_stands: state.clock.is_standing() && wishes.are_content(),
             carried_n: law.force.external.force.z,
             applied_n: law.force.external.force.norm(),
@@ -590,14 +716,18 @@ impl Coordinator {
         let mut references = law.hands.iter();
         let present = self.grips.present(&state.hybrid);
         let robots = self.hands_of_robots.iter().zip(&state.leading.clocks).zip(X_WO).zip(present);
-        for (command, (((&hands, own_clock), X_WO), present)) in out.commands.iter_mut().zip(robots) {
+        for (robot, (command, (((&hands, own_clock), X_WO), present))) in
+            out.commands.iter_mut().zip(robots).enumerate()
+        {
             let X_OW = X_WO.inverse();
-            let clock = if self.leading.is_some() { own_clock } else { &state.clock };
+            let team_clock = if self.leading.is_some() { own_clock } else { &state.clock };
+            let closed_hands = membership::closed_hands(&state.memberships, robot, present, hands);
             *command = TeamCommand {
-                team_mode: mode_of(state, phase),
+                // Its feet go on to follow its hands, whatever the team does.
+                team_mode: if state.memberships.is_led(robot) { mode::CARRY } else { mode_of(state, phase) },
                 state_tick: tick,
-                step_clock: clock.clock,
-                closed_hands: if self.job.closes_hands(phase) { present } else { 0 },
+                step_clock: state.memberships.own_clock(robot).unwrap_or(team_clock).clock,
+                closed_hands: if self.job.closes_hands(phase) { closed_hands } else { 0 },
                 ..TeamCommand::zeroed()
             };
             for (hand, reference) in references.by_ref().take(hands.min(MAX_HANDS)).enumerate() {
@@ -679,6 +809,21 @@ fn read_hands<'a>(
         }
     }
     Ok(())
+}
+
+/// Whether a hand is so near its place that it may close.
+fn is_in_reach(hand: &Pose<World, Hand>, place: &Pose<World, Hand>) -> bool {
+    let way = hand.translation - place.translation;
+    way.norm() <= REACH_M && place.displacement_to(hand).angular.norm() <= REACH_RAD
+}
+
+/// How far each hand was seen off its grip in this tick.
+fn gaps_of(team: &TeamScratch) -> [Twist<World>; MAX_HANDS_OF_TEAM] {
+    let mut off = [Twist::zero(); MAX_HANDS_OF_TEAM];
+    for (off, gap) in off.iter_mut().zip(&team.gaps) {
+        *off = gap.map_or_else(Twist::zero, |gap| gap.tip);
+    }
+    off
 }
 
 /// Moves every hand's reference along its palm; it stays there.

@@ -137,7 +137,10 @@ impl Servo {
             flags: 0,
             ease: 1.0,
             burden: robot.burden(&kinematics, 0.0, None),
-            closed_hands: if run.scenario.begins_closed() { all_hands(robot.palms.len()) } else { 0 },
+            closed_hands: match run.scenario.begins_closed(&spec.member.name) {
+                true => all_hands(robot.palms.len()),
+                false => 0,
+            },
         };
         Ok(Self { robot, legs, fallback, period_s: run.scenario.control_period_s, initial })
     }

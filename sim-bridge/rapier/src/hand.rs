@@ -78,10 +78,25 @@ impl Hand {
         robot.apply(world, self.palm, &-self.wrench);
     }
 
-    /// Whether it could close on the object.
-    pub fn is_in_reach(&self, world: &PhysicsWorld, robot: &Articulation, object: RigidBodyHandle) -> bool {
+    /// It closes on an object that hangs in other robots' hands: where it is.
+    pub fn take_hold(&mut self, world: &PhysicsWorld, robot: &Articulation, object: RigidBodyHandle) {
+        let Some(body) = world.bodies.get(object) else { return };
+        let X_WO = pose::<World, Object>(&from_isometry(body.position()));
+        let X_OH = X_WO.inverse() * robot.frame_pose::<HandFrame>(world, self.palm);
+        self.pulled_to = Isometry3::from_parts(X_OH.translation.into(), X_OH.rotation);
+    }
+
+    /// Whether it could close on the object: at its place, or, where others hold it, near where it held before.
+    pub fn is_in_reach(
+        &self,
+        world: &PhysicsWorld,
+        robot: &Articulation,
+        object: RigidBodyHandle,
+        others_hold: bool,
+    ) -> bool {
         let Some(body) = world.bodies.get(object) else { return false };
-        let place = pose::<World, Object>(&from_isometry(body.position())) * self.place;
+        let place = if others_hold { pose(&self.pulled_to) } else { self.place };
+        let place = pose::<World, Object>(&from_isometry(body.position())) * place;
         let gap = place.displacement_to(&robot.frame_pose(world, self.palm));
         gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
     }

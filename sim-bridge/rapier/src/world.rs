@@ -298,7 +298,7 @@ impl Robot {
             .collect();
         let counts = SensorCounts { joints: body.joint_count(), hands: hands.len(), feet: MAX_FEET };
         Ok(Self {
-            holding: if scenario.begins_closed() { all_hands(hands.len()) } else { 0 },
+            holding: if scenario.begins_closed(&spec.member.name) { all_hands(hands.len()) } else { 0 },
             standing: Standing {
                 soles: body.body.sole_rectangles,
                 weight_n: body.body.model.total_mass_kg() * GRAVITY_M_S2,
@@ -433,12 +433,20 @@ impl World {
     }
 
     fn close_and_open(&mut self, commands: &[JointCommand]) {
-        for (robot, command) in self.robots.iter_mut().zip(commands) {
-            for (index, hand) in robot.hands.iter().enumerate() {
+        let held = self.robots.iter().enumerate();
+        let holders = held.fold(0_u64, |set, (index, robot)| set | u64::from(robot.holding != 0) << index);
+        for (number, (robot, command)) in self.robots.iter_mut().zip(commands).enumerate() {
+            let others_hold = holders & !(1 << number) != 0;
+            for (index, hand) in robot.hands.iter_mut().enumerate() {
                 let bit = 1 << index;
                 let (holds, shall_hold) = (robot.holding & bit != 0, command.closed_hands & bit != 0);
-                if holds != shall_hold && (holds || hand.is_in_reach(&self.world, &robot.body, self.object)) {
+                if holds != shall_hold
+                    && (holds || hand.is_in_reach(&self.world, &robot.body, self.object, others_hold))
+                {
                     robot.holding ^= bit;
+                    if shall_hold && others_hold {
+                        hand.take_hold(&self.world, &robot.body, self.object);
+                    }
                 }
             }
         }

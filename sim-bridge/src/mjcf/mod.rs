@@ -133,7 +133,7 @@ fn write_world(
                 r#"    <weld name="{0}" site1="{0}" site2="{1}" solref="0.02 1" active="{2}"/>"#,
                 escape(&grasp.palm),
                 escape(&grasp.site),
-                scenario.begins_closed(),
+                grasp.begins_closed,
             )?;
         }
         writeln!(xml, "  </equality>")?;

@@ -24,6 +24,7 @@ const PARTS: [(&str, &[&str]); 3] = [
             "grasp.rs",
             "coordination.rs",
             "job.rs",
+            "membership.rs",
             "motion.rs",
             "operator.rs",
             "world.rs",

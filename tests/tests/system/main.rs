@@ -16,6 +16,7 @@ mod json;
 mod latency;
 mod leader_follower;
 mod lost_grasp;
+mod members;
 mod real_time;
 mod record;
 mod render;

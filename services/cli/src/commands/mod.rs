@@ -3,6 +3,7 @@
 pub mod adopt;
 pub mod check_robot;
 pub mod doctor;
+pub mod membership;
 pub mod operator;
 pub mod plan;
 pub mod push;

@@ -3,6 +3,9 @@
 use super::snapshot::{ProcessRow, RobotRow, Snapshot, Team};
 use crate::table;
 
+/// A robot that carries with the others.
+const MEMBER: &str = mikoshi_ipc_types::member_stage::name(mikoshi_ipc_types::member_stage::MEMBER);
+
 /// Margins below this are as good as none, as in a run's figures.
 const EDGE_M: f64 = mikoshi_observation::Figures::EDGE_M;
 
@@ -142,7 +145,8 @@ fn robots(rows: &[RobotRow]) -> Sheet {
         }
         vec![
             row.name.clone(),
-            row.mode.to_owned(),
+            // Who is on his way out or in says so.
+            if row.member == MEMBER { row.mode } else { row.member }.to_owned(),
             format!("{:.1}", 1e3 * row.zmp_margin_m),
             format!("{:.1}", 1e3 * row.capture_point_margin_m),
             format!("{:.2}", row.tilt_rad.to_degrees()),
@@ -208,6 +212,7 @@ mod tests {
         let robot = |name: &String| RobotRow {
             name: name.clone(),
             mode: "carry",
+            member: MEMBER,
             zmp_margin_m: 0.0321,
             capture_point_margin_m: 0.0287,
             tilt_rad: 0.01,

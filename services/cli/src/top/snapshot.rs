@@ -2,7 +2,7 @@
 
 use super::window::{PhaseTimes, RobotMoment};
 use crate::commands::status::ProcessStatus;
-use mikoshi_ipc_types::{RobotState, TeamState, all_hands, flag, mode, stop_cause};
+use mikoshi_ipc_types::{RobotState, TeamState, all_hands, flag, member_stage, mode, stop_cause};
 use mikoshi_observation::{Observation, ObservedRobot, ObservedRun};
 use mikoshi_spatial::{Object, Pose, World};
 use nalgebra::Vector3;
@@ -72,6 +72,8 @@ pub struct RobotRow {
     pub name: String,
     /// As the robot was told.
     pub mode: &'static str,
+    /// `member`, or how far it is on its way out of the team or into it.
+    pub member: &'static str,
     pub zmp_margin_m: f64,
     pub capture_point_margin_m: f64,
     pub tilt_rad: f64,
@@ -145,6 +147,7 @@ impl RobotRow {
         Self {
             name: robot.name.clone(),
             mode: mode::name(observation.team_command[index].payload.team_mode),
+            member: member_stage::name(observation.team_state.payload.member_stage[index]),
             zmp_margin_m: worst.zmp_margin_m,
             capture_point_margin_m: worst.capture_point_margin_m,
             tilt_rad: worst.tilt_rad,

@@ -14,7 +14,7 @@ use mikoshi_config::RunSpec;
 use mikoshi_config::scenario::Clock;
 use mikoshi_coordinator::build_hybrid_law;
 use mikoshi_ipc_types::{ServiceId, TeamState, stop_cause};
-use mikoshi_observation::{Freshness, Observation, ObservedRun, safe_stop_text};
+use mikoshi_observation::{Freshness, Observation, ObservedRun, lost_hands, safe_stop_text};
 use mikoshi_resolution::tick_schedule;
 use mikoshi_runtime::{Board, Role, SlotStatus, State};
 use std::collections::{BTreeMap, VecDeque};
@@ -89,8 +89,8 @@ impl Watch {
         let before = self
             .last
             .as_ref()
-            .map(|last| (last.team_state.payload.stop_cause, last.team_state.payload.absent_hands));
-        let (cause, absent) = before.unwrap_or_default();
+            .map(|last| (last.team_state.payload.stop_cause, lost_hands(&last.team_state.payload)));
+        let (cause, lost_before) = before.unwrap_or_default();
         if team.stop_cause != cause {
             let what = match team.stop_cause {
                 0 => "the team goes on".to_owned(),
@@ -98,8 +98,9 @@ impl Watch {
             };
             self.note(observation.tick(), what);
         }
-        if team.absent_hands & !absent != 0 {
-            let lost = (team.absent_hands & !absent).count_ones();
+        let lost = lost_hands(team) & !lost_before;
+        if lost != 0 {
+            let lost = lost.count_ones();
             self.note(
                 observation.tick(),
                 format!("hands lost: {lost}, {}", stop_cause::name(team.loss_cause)),
