@@ -5,7 +5,7 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use bytemuck::Zeroable;
 use mikoshi_config::RunSpec;
 use mikoshi_coordinator::{Coordinator, CoordinatorOutputs, CoordinatorScratch, CoordinatorState};
-use mikoshi_ipc_types::{PoseWire, RobotState, TeamState, all_hands, flag, mode};
+use mikoshi_ipc_types::{PoseWire, RobotState, TeamState, all_hands, flag};
 use mikoshi_spatial::{Hand, Object, Pose, Twist, World, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
 
