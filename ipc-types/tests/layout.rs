@@ -96,8 +96,10 @@ fn sizes_follow_from_the_limits() {
             + 3
             + 2 * (1 + 3 + 6)
             + MAX_ROBOTS
+            + 1
+            + 3 * MAX_ROBOTS
             + 1),
-        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, tick and frame by robot, slip by hand, lost hands and why, what was said last by whoever drives, silence, squeeze, awaited word, mass, centre and inertia of the load with their deviations, share by robot, relief"
+        "two wrenches by row, two poses, twist, share, step clock, mode, operator, cause and robot of a stop, tick and frame by robot, slip by hand, lost hands and why, what was said last by whoever drives, silence, squeeze, awaited word, mass, centre and inertia of the load with their deviations, share by robot, relief, stage, fault and weight by robot, hands that are away"
     );
     assert_eq!(
         size_of::<ObjectTruth>(),

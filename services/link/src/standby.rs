@@ -32,6 +32,8 @@ use zenoh::{Session, Wait as _};
 
 /// Checkpoints that may wait to be kept.
 const QUEUE: usize = 4;
+/// How often what a robot's servo keeps is sent: nobody takes over from it at once, and it shares its way with frames.
+const SERVO_AGAIN_NS: u64 = 100_000_000;
 /// How often what was kept is given back to a host that waits for it.
 const GIVE_AGAIN_NS: u64 = 100_000_000;
 
@@ -49,7 +51,7 @@ pub(crate) struct Standby {
     kept: Arc<Kept>,
     /// One past the tick of what was sent last.
     next_tick: u64,
-    given_ns: u64,
+    sent_ns: u64,
 }
 
 /// What is counted of what comes.
@@ -118,7 +120,7 @@ impl Standby {
             arrived,
             kept,
             next_tick: 0,
-            given_ns: 0,
+            sent_ns: 0,
         };
         Ok(Some((standby, subscriber)))
     }
@@ -132,6 +134,7 @@ impl Standby {
         // What is lost is as if the next one had come: it is droppable.
         let _ = self.publisher.put(message(&peers.header(), checkpoint)).wait();
         self.next_tick = checkpoint.position.tick + 1;
+        self.sent_ns = now_ns();
     }
 
     /// Sends what the service of this host has kept before it said something in this tick.
@@ -139,6 +142,9 @@ impl Standby {
         let (epoch, _) = board.charge_of(self.service).unwrap_or_default();
         let at = board.last_position(self.service).unwrap_or_default();
         if at.tick < self.next_tick || !peers.is_here(self.service) || board.is_reserved(self.service) {
+            return Ok(());
+        }
+        if !self.has_two_places && now_ns() < self.sent_ns.saturating_add(SERVO_AGAIN_NS) {
             return Ok(());
         }
         let kept = kept_by(&self.run, self.service, epoch);
@@ -196,11 +202,9 @@ impl Standby {
     /// Gives what is kept here to a host of the service that has to go on from it, and has not got it.
     fn give_back(&mut self, peers: &Peers, goes_on: Option<bool>) -> Result<(), TickError> {
         let waits = peers.state_of(self.service).is_some_and(|state| state < State::Running);
-        let now_ns = now_ns();
-        if goes_on != Some(true) || !waits || now_ns < self.given_ns.saturating_add(GIVE_AGAIN_NS) {
+        if goes_on != Some(true) || !waits || now_ns() < self.sent_ns.saturating_add(GIVE_AGAIN_NS) {
             return Ok(());
         }
-        self.given_ns = now_ns;
         let latest = self.copy.latest().map_err(|_| TickError::Checkpoint("the copy can't be read"))?;
         if let Some(latest) = latest {
             self.send(peers, &latest);
