@@ -291,7 +291,10 @@ fn a_servo_that_was_cut_off_until_its_plan_was_over_begins_anew_where_its_robot_
         let lost = eighth as usize % 2;
         let fate = cut_off(lost, eighth, 650);
         assert!(fate.stop.is_some() && fate.fell == 0, "{eighth}: {fate:?}");
-        assert!(fate.tilt_max_rad < 0.1 && fate.sunk_m < 0.03 && fate.margin_min_m > 0.0, "{eighth}: {fate:?}");
+        assert!(
+            fate.tilt_max_rad < 0.1 && fate.sunk_m < 0.03 && fate.margin_min_m > 0.0,
+            "{eighth}: {fate:?}"
+        );
         // In the third of these phases one foot comes to bear a fifth of the robot, and it is not found ready.
         assert!(eighth == 2 || !fate.stopped_in_the_end, "{eighth}: {fate:?}");
     }
