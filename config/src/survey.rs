@@ -3,7 +3,7 @@
 use crate::document::Node;
 use crate::error::LoadConfigError;
 use crate::load::{find, refuse};
-use crate::sweep::{LoadedSweep, load_sweep};
+use crate::sweep::{self, LoadedSweep, load_sweep};
 use crate::{decode::decode, validate};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -58,7 +58,7 @@ fn all_runs(sweeps: &[LoadedSweep]) -> u64 {
 pub fn load_sweep_file(path: &Path) -> Result<SweepFile, LoadConfigError> {
     let document = Node::read(path)?;
     if document.get("sweeps").is_none() {
-        return load_sweep(path).map(|sweep| SweepFile::Sweep(Box::new(sweep)));
+        return sweep::of_document(&document, path).map(|sweep| SweepFile::Sweep(Box::new(sweep)));
     }
     let survey: Survey = decode(&document)?;
     let folder = path.with_extension("");

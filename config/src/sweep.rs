@@ -112,19 +112,23 @@ impl LoadedSweep {
 /// Loads `DIR/sweeps/NAME.toml`, and the scenario that it names from `DIR/scenarios` to check it: with what
 /// the first run draws, at both ends of all ranges, and with every value of the grid.
 pub fn load_sweep(path: &Path) -> Result<LoadedSweep, LoadConfigError> {
-    let document = Node::read(path)?;
-    let sweep: Sweep = decode(&document)?;
+    of_document(&Node::read(path)?, path)
+}
+
+/// The same of what was read from `path`.
+pub(crate) fn of_document(document: &Node, path: &Path) -> Result<LoadedSweep, LoadConfigError> {
+    let sweep: Sweep = decode(document)?;
     let mut set = Vec::new();
     if let Some(node) = document.get("set") {
         leaves(node, "", &mut set);
     }
     let keys: Vec<_> = set.iter().map(|(key, _)| key.as_str()).collect();
-    let followers: Vec<_> = (0..sweep.grid.len()).map(|axis| grid::followers(&document, axis)).collect();
-    refuse(&document, validate::sweep(&sweep, &keys, &followers))?;
+    let followers: Vec<_> = (0..sweep.grid.len()).map(|axis| grid::followers(document, axis)).collect();
+    refuse(document, validate::sweep(&sweep, &keys, &followers))?;
     let scenario = find(&sibling(path, "scenarios"), &sweep.scenario)
         .map_err(|problem| document.key_error("scenario", problem))?;
 
-    let grid = Grid::of(&document, &sweep.grid)?;
+    let grid = Grid::of(document, &sweep.grid)?;
     let samples = grid.samples();
     let check = |at: &str, point: &[(String, Node)]| {
         let value_of = |range: &ParameterRange| match at {

@@ -2,31 +2,17 @@
 //!
 //! Each case changes one file of `fixture/` or adds options; paths in the expected text are relative to it.
 
+mod common;
+
+use common::{fixture, original};
 use mikoshi_config::{LoadConfigError, LoadedScenario, load_robot, load_scenario};
 use proptest::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 const SCENARIO: &str = "scenarios/lift.toml";
 const TEAM: &str = "teams/pair.toml";
 const ROBOT: &str = "robots/arm.toml";
-
-fn original() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixture")
-}
-
-fn fixture() -> TempDir {
-    let (copy, original) = (TempDir::new().unwrap(), original());
-    for folder in ["scenarios", "teams", "robots"] {
-        fs::create_dir(copy.path().join(folder)).unwrap();
-        for entry in fs::read_dir(original.join(folder)).unwrap() {
-            let name = Path::new(folder).join(entry.unwrap().file_name());
-            fs::copy(original.join(&name), copy.path().join(&name)).unwrap();
-        }
-    }
-    copy
-}
 
 fn load(root: &Path, options: &[&str]) -> Result<LoadedScenario, LoadConfigError> {
     let pairs = options.iter().map(|option| option.split_once('=').unwrap());

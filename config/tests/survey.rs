@@ -1,8 +1,10 @@
 //! Surveys: which sweeps they name, and what is refused before any runs.
 
+mod common;
+
 use mikoshi_config::{SweepFile, load_sweep_file};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 const SURVEY: &str = r#"name = "many"
@@ -23,15 +25,7 @@ max = 6
 
 /// The fixture with a survey of this text, and its two sweeps.
 fn fixture(text: &str) -> (TempDir, PathBuf) {
-    let (copy, original) =
-        (TempDir::new().unwrap(), Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixture"));
-    for folder in ["scenarios", "teams", "robots"] {
-        fs::create_dir(copy.path().join(folder)).unwrap();
-        for entry in fs::read_dir(original.join(folder)).unwrap() {
-            let name = Path::new(folder).join(entry.unwrap().file_name());
-            fs::copy(original.join(&name), copy.path().join(&name)).unwrap();
-        }
-    }
+    let copy = common::fixture();
     fs::create_dir_all(copy.path().join("sweeps/many")).unwrap();
     fs::write(copy.path().join("sweeps/many/lifts.toml"), SWEEP).unwrap();
     let drops = SWEEP.replace("lifts", "drops").replace("runs = 10", "runs = 5").replace("= 9", "= 5");

@@ -1,9 +1,11 @@
 //! Sweeps: what each run draws, and what is refused before any runs.
 
+mod common;
+
 use mikoshi_config::sweep::Comparison;
 use mikoshi_config::{LoadedSweep, load_scenario, load_sweep};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 const GOOD: &str = r#"name = "lifts"
@@ -29,15 +31,7 @@ whole = true
 
 /// The fixture with a sweep of this text.
 fn fixture(text: &str) -> (TempDir, PathBuf) {
-    let (copy, original) =
-        (TempDir::new().unwrap(), Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixture"));
-    for folder in ["scenarios", "teams", "robots"] {
-        fs::create_dir(copy.path().join(folder)).unwrap();
-        for entry in fs::read_dir(original.join(folder)).unwrap() {
-            let name = Path::new(folder).join(entry.unwrap().file_name());
-            fs::copy(original.join(&name), copy.path().join(&name)).unwrap();
-        }
-    }
+    let copy = common::fixture();
     fs::create_dir(copy.path().join("sweeps")).unwrap();
     let path = copy.path().join("sweeps/lifts.toml");
     fs::write(&path, text).unwrap();

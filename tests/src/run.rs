@@ -25,6 +25,14 @@ pub struct Said {
 }
 
 impl Said {
+    /// The tick that was told: "… from tick N on".
+    #[track_caller]
+    pub fn from_tick(&self) -> u64 {
+        assert_eq!(self.status, Some(0), "{self:#?}");
+        let (_, behind) = self.out.split_once("from tick ").expect("a tick");
+        behind.split_whitespace().next().and_then(|tick| tick.parse().ok()).expect("a tick")
+    }
+
     /// Ends the test unless the exit status is this and every text was said on standard error.
     #[track_caller]
     pub fn expect_error(&self, status: i32, texts: &[&str]) {
@@ -133,6 +141,20 @@ impl Running {
     /// Its directory in shared memory.
     pub fn directory(&self) -> PathBuf {
         RunDirectory::default_base().join(format!("{}-0", self.supervisor.id()))
+    }
+
+    /// `mikoshi COMMAND ARGUMENTS` of this run, to its end.
+    pub fn say(&self, command: &[&str]) -> Said {
+        let name = self.directory().file_name().expect("a name").to_string_lossy().into_owned();
+        say_mikoshi([command, &["--run", &name]].concat())
+    }
+
+    /// Waits until the world is in this tick.
+    pub fn wait_for_tick(&self, tick: u64) {
+        let board = Board::open(&self.directory()).expect("it runs");
+        while board.last_position(ServiceId::Bridge).is_none_or(|at| at.tick < tick) {
+            yield_now();
+        }
     }
 
     /// The processes of its services.

@@ -1,7 +1,6 @@
 //! Somebody drives: by a script of the scenario, by one of the command, by keys.
 
 use mikoshi_ipc_types::{ObjectTruth, Payload, ServiceId, TeamState};
-use mikoshi_runtime::Board;
 use mikoshi_tests::log::Log;
 use mikoshi_tests::programs::mikoshi;
 use mikoshi_tests::run::{Results, Running, left_behind, run, say_mikoshi};
@@ -38,13 +37,6 @@ fn distance([x, y, z, ..]: [f64; 7], [u, v, w, ..]: [f64; 7]) -> f64 {
 
 fn name_of(running: &Running) -> String {
     running.directory().file_name().expect("it has a name").to_string_lossy().into_owned()
-}
-
-fn wait_for_tick(running: &Running, tick: u64) {
-    let board = Board::open(&running.directory()).expect("it runs");
-    while board.last_position(ServiceId::Bridge).is_none_or(|at| at.tick < tick) {
-        yield_now();
-    }
 }
 
 fn replays(log: &Path) {
@@ -124,7 +116,7 @@ fn processes_killed_while_somebody_drives_leave_the_same_bytes_as_one_thread() {
     for (tick, service) in
         [(400, ServiceId::Coordinator), (700, ServiceId::Servo(1)), (1300, ServiceId::Coordinator)]
     {
-        wait_for_tick(&running, tick);
+        running.wait_for_tick(tick);
         running.signal_service(service, Signal::KILL);
     }
     let said = running.wait();
@@ -194,9 +186,9 @@ fn an_object_whose_driver_is_killed_rests_in_time_though_the_coordinator_is_kill
         .stdout(Stdio::null())
         .spawn()
         .expect("it can be started");
-    wait_for_tick(&running, 1500);
+    running.wait_for_tick(1500);
     running.signal_service(ServiceId::Coordinator, Signal::KILL);
-    wait_for_tick(&running, 2500);
+    running.wait_for_tick(2500);
     driver.kill().expect("it runs");
     driver.wait().expect("it was started");
     let said = running.wait();

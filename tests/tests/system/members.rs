@@ -1,14 +1,12 @@
 //! Robots leave and join while the team carries: with physics, from the scenario to the summary.
 
 use mikoshi_ipc_types::ServiceId;
-use mikoshi_runtime::Board;
 use mikoshi_tests::log::Log;
-use mikoshi_tests::run::{Results, Running, Said, run, say_mikoshi};
+use mikoshi_tests::run::{Results, Running, run, say_mikoshi};
 use mikoshi_tests::scenarios::of_project;
 use rustix::process::Signal;
 use serde_json::Value;
 use std::path::Path;
-use std::thread::yield_now;
 
 /// D's way out and in, in the order of time.
 const STAGES: [&str; 13] = [
@@ -77,39 +75,19 @@ fn processes_and_one_thread_see_a_robot_leave_with_the_same_bytes() {
     assert_eq!(Log::read(&threads.log()).first_difference(&Log::read(&processes.log())), None);
 }
 
-/// `mikoshi COMMAND ROBOT` of this run.
-fn say_of(running: &Running, command: &[&str]) -> Said {
-    let name = running.directory().file_name().expect("a name").to_string_lossy().into_owned();
-    say_mikoshi([command, &["--run", &name]].concat())
-}
-
-fn wait_for_tick(running: &Running, tick: u64) {
-    let board = Board::open(&running.directory()).expect("it runs");
-    while board.last_position(ServiceId::Bridge).is_none_or(|at| at.tick < tick) {
-        yield_now();
-    }
-}
-
-/// The tick that was told: "… from tick N on".
-fn tick_in(said: &Said) -> u64 {
-    assert_eq!(said.status, Some(0), "{said:#?}");
-    let (_, behind) = said.out.split_once("from tick ").expect("a tick");
-    behind.split_whitespace().next().and_then(|tick| tick.parse().ok()).expect("a tick")
-}
-
 #[test]
 fn somebody_asks_a_robot_to_leave_while_processes_are_killed_and_the_log_replays() {
     let results = Results::new();
     let arguments = ["--set", "membership=", "--set", "motion=", "--set", "duration_s=9"];
     let running = Running::start(&of_project("members"), &arguments, &results);
-    wait_for_tick(&running, 300);
-    say_of(&running, &["leave", "Z"]).expect_error(2, &["\"Z\"", "a robot of the team"]);
-    say_of(&running, &["join", "D"]).expect_error(2, &["in the team already"]);
-    let left = tick_in(&say_of(&running, &["leave", "D"]));
-    say_of(&running, &["leave", "D"]).expect_error(2, &["away already"]);
-    wait_for_tick(&running, left + 200);
+    running.wait_for_tick(300);
+    running.say(&["leave", "Z"]).expect_error(2, &["\"Z\"", "a robot of the team"]);
+    running.say(&["join", "D"]).expect_error(2, &["in the team already"]);
+    let left = running.say(&["leave", "D"]).from_tick();
+    running.say(&["leave", "D"]).expect_error(2, &["away already"]);
+    running.wait_for_tick(left + 200);
     running.signal_service(ServiceId::Coordinator, Signal::KILL);
-    wait_for_tick(&running, left + 500);
+    running.wait_for_tick(left + 500);
     running.signal_service(ServiceId::Bridge, Signal::KILL);
     let said = running.wait();
     assert_eq!(said.status, Some(1), "it is still on its way: {said:#?}");

@@ -1,34 +1,12 @@
 //! Pushes, and settings that change, while a run goes on.
 
 use mikoshi_ipc_types::{ObjectTruth, RobotTruth, ServiceId, TeamCommand, TeamState};
-use mikoshi_runtime::Board;
 use mikoshi_tests::log::Log;
-use mikoshi_tests::run::{Results, Running, Said, run, say_mikoshi};
+use mikoshi_tests::run::{Results, Running, run, say_mikoshi};
 use mikoshi_tests::scenarios::of_project;
 use rustix::process::Signal;
 use serde_json::Value;
 use std::path::Path;
-use std::thread::yield_now;
-
-/// `mikoshi COMMAND ARGUMENTS` of this run, to its end.
-fn say_of(running: &Running, command: &[&str]) -> Said {
-    let name = running.directory().file_name().expect("a name").to_string_lossy().into_owned();
-    say_mikoshi([command, &["--run", &name]].concat())
-}
-
-fn wait_for_tick(running: &Running, tick: u64) {
-    let board = Board::open(&running.directory()).expect("it runs");
-    while board.last_position(ServiceId::Bridge).is_none_or(|at| at.tick < tick) {
-        yield_now();
-    }
-}
-
-/// The tick that was told: "… from tick N on".
-fn tick_in(said: &Said) -> usize {
-    assert_eq!(said.status, Some(0), "{said:#?}");
-    let (_, behind) = said.out.split_once("from tick ").expect("a tick");
-    behind.split_whitespace().next().and_then(|tick| tick.parse().ok()).expect("a tick")
-}
 
 fn replays(log: &Path) {
     let said = say_mikoshi([Path::new("replay"), log]);
@@ -63,7 +41,7 @@ fn a_push_of_the_scenario_is_the_same_though_the_world_is_replaced_in_the_middle
         assert!(sway > 5e-4, "{scenario}: it gives way: {sway} m");
 
         let running = Running::start(&of_project(scenario), &arguments, &processes);
-        wait_for_tick(&running, 430);
+        running.wait_for_tick(430);
         running.signal_service(ServiceId::Bridge, Signal::KILL);
         running.wait();
         assert_eq!(log.first_difference(&Log::read(&processes.log())), None, "{scenario}");
@@ -79,14 +57,14 @@ fn somebody_pushes_robots_and_the_object_while_they_stand_and_the_log_replays() 
         &[&STANDING[..4], &["--set", "duration_s=20"]].concat(),
         &results,
     );
-    say_of(&running, &["push", "Z", "--force", "0,1,0", "--for", "0.2"])
+    running
+        .say(&["push", "Z", "--force", "0,1,0", "--for", "0.2"])
         .expect_error(2, &["\"Z\"", "object or one of A, B"]);
-    say_of(&running, &["push", "A", "--force", "0,1e9,0", "--for", "0.2"])
-        .expect_error(2, &["at most 1000 N"]);
-    say_of(&running, &["push", "A", "--force", "0,1,0", "--for", "-1"]).expect_error(2, &["--for"]);
-    say_of(&running, &["push", "A", "--force", "0,1", "--for", "1"]).expect_error(2, &["three numbers"]);
-    let first = tick_in(&say_of(&running, &["push", "B", "--force", "0,-15,0", "--for", "0.2"]));
-    let second = tick_in(&say_of(&running, &["push", "object", "--force", "2,0,-5", "--for", "0.1"]));
+    running.say(&["push", "A", "--force", "0,1e9,0", "--for", "0.2"]).expect_error(2, &["at most 1000 N"]);
+    running.say(&["push", "A", "--force", "0,1,0", "--for", "-1"]).expect_error(2, &["--for"]);
+    running.say(&["push", "A", "--force", "0,1", "--for", "1"]).expect_error(2, &["three numbers"]);
+    let first = running.say(&["push", "B", "--force", "0,-15,0", "--for", "0.2"]).from_tick() as usize;
+    let second = running.say(&["push", "object", "--force", "2,0,-5", "--for", "0.1"]).from_tick() as usize;
     running.signal_service(ServiceId::Bridge, Signal::KILL);
     running.wait();
     let log = Log::read(&results.log());
@@ -108,17 +86,18 @@ fn gains_and_references_change_in_one_tick_without_a_jump_and_the_log_replays() 
     let results = Results::new();
     let arguments = ["--set", "duration_s=16", "--set", "hybrid.start_s=0.5"];
     let running = Running::start(&of_project("squeeze"), &arguments, &results);
-    wait_for_tick(&running, 800);
+    running.wait_for_tick(800);
     for (settings, expected) in [
         (&["hybrid.kz=0.04", "gait.lift_m=0.04"][..], "gait.lift_m can't be set"),
         (&["hybrid.kz=7"], "hybrid.kz: found 7"),
         (&["hybrid.kzz=0.05"], "unknown key"),
         (&["duration_s=20"], "duration_s can't change in the middle of a run"),
     ] {
-        say_of(&running, &[&["set"], settings].concat()).expect_error(2, &[expected]);
+        running.say(&[&["set"], settings].concat()).expect_error(2, &[expected]);
     }
-    let tick = tick_in(&say_of(&running, &["set", "hybrid.axes.0.reference=30", "hybrid.loop_gain=0.05"]));
-    wait_for_tick(&running, tick as u64 + 100);
+    let tick =
+        running.say(&["set", "hybrid.axes.0.reference=30", "hybrid.loop_gain=0.05"]).from_tick() as usize;
+    running.wait_for_tick(tick as u64 + 100);
     running.signal_service(ServiceId::Coordinator, Signal::KILL);
     let said = running.wait();
     // Its scenario still judges the 20 N that it asked for itself.

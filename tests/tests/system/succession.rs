@@ -45,13 +45,6 @@ fn undisturbed_hash() -> serde_json::Value {
     results.summary()["log_hash"].clone()
 }
 
-fn wait_for_tick(running: &Running, tick: u64) {
-    let board = Board::open(&running.directory()).expect("it runs");
-    while board.last_position(ServiceId::Bridge).is_none_or(|at| at.tick < tick) {
-        yield_now();
-    }
-}
-
 fn epoch_of(running: &Running, service: ServiceId) -> u64 {
     let board = Board::open(&running.directory()).expect("it runs");
     board.charge_of(service).expect("it is there").0
@@ -74,7 +67,7 @@ fn processes_may_be_killed_while_the_team_walks() {
     ];
     let results = disturbed(&[], |running| {
         for (index, victims) in victims.into_iter().enumerate() {
-            wait_for_tick(running, 850 + 120 * index as u64);
+            running.wait_for_tick(850 + 120 * index as u64);
             let epochs: Vec<_> = victims.iter().map(|victim| epoch_of(running, *victim)).collect();
             victims.iter().for_each(|victim| running.signal_service(*victim, Signal::KILL));
             for (victim, epoch) in victims.iter().zip(epochs) {
@@ -99,7 +92,7 @@ fn processes_may_be_killed_while_the_team_walks() {
 fn a_process_that_freezes_is_replaced() {
     let expected = undisturbed_hash();
     let results = disturbed(&[], |running| {
-        wait_for_tick(running, 900);
+        running.wait_for_tick(900);
         running.signal_service(ServiceId::Servo(2), Signal::STOP);
     });
     let summary = results.summary();
@@ -119,7 +112,7 @@ fn processes_are_swapped_while_the_team_walks() {
     let expected = undisturbed_hash();
     let results = disturbed(&[], |running| {
         let before = running.services();
-        wait_for_tick(running, 850);
+        running.wait_for_tick(850);
         for service in ["B", "coordinator", "bridge"] {
             let said = swap(running, &[service]);
             assert_eq!(said.status, Some(0), "{said:#?}");
@@ -138,7 +131,7 @@ fn processes_are_swapped_while_the_team_walks() {
 #[test]
 fn a_swap_may_bring_other_settings_and_the_log_knows_them() {
     let results = disturbed(&[], |running| {
-        wait_for_tick(running, 850);
+        running.wait_for_tick(850);
         for arguments in [
             &["C", "--set", "balance.stabiliser=false"][..],
             &["coordinator", "--set", "hybrid.loop_gain=0.05"],
@@ -158,7 +151,7 @@ fn a_swap_may_bring_other_settings_and_the_log_knows_them() {
 fn a_swap_that_can_not_be_is_refused_and_changes_nothing() {
     let expected = undisturbed_hash();
     let results = disturbed(&[], |running| {
-        wait_for_tick(running, 850);
+        running.wait_for_tick(850);
         let refusals = [
             (&["Z"][..], "expected one of bridge, A, B, C, D, coordinator"),
             (&["A", "--set", "control_period_s=0.004"], "can't change in the middle of a run"),

@@ -2,7 +2,7 @@
 
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_tests::programs::mikoshi;
-use mikoshi_tests::run::{Results, Running, Said, say_mikoshi};
+use mikoshi_tests::run::{Results, Running, say_mikoshi};
 use mikoshi_tests::scenarios::{ENDLESS, of_project};
 use mikoshi_tests::screen::Screen;
 use rustix::process::{Pid, Signal, kill_process};
@@ -18,12 +18,6 @@ fn top(running: &Running, columns: u16, lines: u16) -> Screen {
     let mut command = mikoshi();
     command.args(["top", "--run"]).arg(running.directory().file_name().expect("a name"));
     Screen::start(&command, columns, lines)
-}
-
-/// `mikoshi COMMAND ARGUMENTS` of this run, to its end.
-fn say_of(running: &Running, command: &[&str]) -> Said {
-    let name = running.directory().file_name().expect("a name").to_string_lossy().into_owned();
-    say_mikoshi([command, &["--run", &name]].concat())
 }
 
 fn end(running: Running) {
@@ -76,7 +70,7 @@ fn top_tells_of_stops_and_of_processes_that_were_replaced() {
     screen.wait_for(&ALL);
     running.signal_service(ServiceId::Servo(1), Signal::KILL);
     screen.wait_for(&["another process is servo of robot B"]);
-    say_of(&running, &["stop"]);
+    running.say(&["stop"]);
     screen.wait_for(&["safe stop: operator-stop"]);
     end(running);
     let left = screen.wait();
@@ -112,13 +106,13 @@ fn a_signal_ends_top_and_gives_the_terminal_back() {
 fn one_table_needs_no_terminal_and_has_no_escape_codes_and_json_has_all_of_it() {
     let results = Results::new();
     let running = start(&results, &ENDLESS);
-    let said = say_of(&running, &["top"]);
+    let said = running.say(&["top"]);
     said.expect_error(2, &["needs a terminal", "--once"]);
-    let said = say_of(&running, &["top", "--once"]);
+    let said = running.say(&["top", "--once"]);
     assert_eq!(said.status, Some(0), "{said:#?}");
     assert!(ALL.iter().all(|text| *text == "q quits" || said.out.contains(text)), "{said:#?}");
     assert!(!said.out.contains('\x1b'));
-    let said = say_of(&running, &["top", "--once", "--json"]);
+    let said = running.say(&["top", "--once", "--json"]);
     let told: Value = serde_json::from_str(&said.out).expect("it is JSON");
     let processes = told["processes"].as_array().expect("a list");
     for (service, phases) in
