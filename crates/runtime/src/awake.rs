@@ -1,8 +1,9 @@
 //! Cores that do not fall asleep: one that idles takes tens of microseconds to wake up, and in a tick somebody is woken
 //! up four times.
+//!
+//! Who keeps a core awake keeps watch there, too: it wakes those of the run who sleep on that core.
 
 use crate::{MissingRight, RealTime};
-use core::hint::spin_loop;
 use std::io;
 
 /// Why a core could not be kept awake.
@@ -16,21 +17,20 @@ pub enum AwakeError {
     Policy(#[from] io::Error),
 }
 
-/// Keeps a core awake for ever, by a thread that the kernel runs only while nobody else wants to (`SCHED_IDLE`): it makes
-/// room at once, and needs no right. What it costs is power.
+/// Has the calling thread run on this core alone, and only while nobody else wants to (`SCHED_IDLE`). It makes room at
+/// once, needs no right, and keeps the core awake as long as it does anything ([`Board::keep_watch`]). What it costs is power.
 ///
 /// For the same reason it may take seconds to end where others have enough to do. It belongs in a process of its own,
 /// for which nobody waits.
 ///
 /// # Errors
 /// The core is not ours, or the thread would be in others' way.
-pub fn keep_awake(core: usize) -> Result<core::convert::Infallible, AwakeError> {
+///
+/// [`Board::keep_watch`]: crate::Board::keep_watch
+pub fn run_when_idle(core: usize) -> Result<(), AwakeError> {
     let on_missing_right = crate::OnMissingRight::Fail;
     RealTime { core: Some(core), on_missing_right, ..RealTime::default() }.apply()?;
-    run_only_when_idle()?;
-    loop {
-        spin_loop();
-    }
+    Ok(leave_to_others()?)
 }
 
 /// The cores that are to be kept awake: those that services are pinned to or, if none is, all that this process may use,
@@ -47,7 +47,7 @@ pub fn cores_to_keep_awake(pinned: impl Iterator<Item = usize>, services: usize)
 }
 
 /// Leaves the core of the calling thread to whoever else wants it.
-fn run_only_when_idle() -> io::Result<()> {
+fn leave_to_others() -> io::Result<()> {
     let parameter = libc::sched_param { sched_priority: 0 };
     // SAFETY: the parameter lives across the call, which only reads it; 0 is the calling thread.
     match unsafe { libc::sched_setscheduler(0, libc::SCHED_IDLE, &parameter) } {
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn who_runs_only_when_nobody_else_does_needs_no_right() {
         let policy = std::thread::spawn(|| {
-            run_only_when_idle().expect("everybody may");
+            leave_to_others().expect("everybody may");
             // SAFETY: it only reads the calling thread's policy.
             unsafe { libc::sched_getscheduler(0) }
         });
@@ -71,8 +71,8 @@ mod tests {
     }
 
     #[test]
-    fn a_core_that_is_not_ours_is_not_kept_awake() {
-        let error = std::thread::spawn(|| keep_awake(usize::MAX)).join().expect("no panic");
+    fn a_core_that_is_not_ours_is_left_alone() {
+        let error = std::thread::spawn(|| run_when_idle(usize::MAX)).join().expect("no panic");
         assert!(error.is_err_and(|error| error.to_string().contains("cpuset")));
     }
 

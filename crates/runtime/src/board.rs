@@ -6,7 +6,8 @@
 
 use crate::mailbox::Mailbox;
 use crate::process::ProcessIdentity;
-use crate::wait::Bed;
+use crate::wait::{Bed, PLACES};
+use crate::watch::Watch;
 use crate::{FaultCode, Position, TickError};
 use core::fmt;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -307,6 +308,11 @@ impl Slot {
         &self.lobbies[phase.min(LOBBIES - 1)]
     }
 
+    /// All in which anybody sleeps.
+    pub(crate) fn beds(&self) -> impl Iterator<Item = &Bed> {
+        [&self.bed, &self.porch].into_iter().chain(&self.lobbies)
+    }
+
     /// Rings for everything that its owner may have sent.
     pub(crate) fn ring_all(&self) {
         self.bells.iter().for_each(Bell::ring);
@@ -477,13 +483,15 @@ struct Header {
     drive: Mailbox<DRIVE_WORDS>,
     /// A [`Push`].
     push: Mailbox<PUSH_WORDS>,
+    /// By core.
+    watches: [Watch; PLACES],
 }
 
 const DRIVE_WORDS: usize = size_of::<Drive>() / size_of::<u64>();
 const PUSH_WORDS: usize = size_of::<Push>() / size_of::<u64>();
 
 /// Names the layout too: another one gets another number.
-const MAGIC: u64 = u64::from_le_bytes(*b"mikosh11");
+const MAGIC: u64 = u64::from_le_bytes(*b"mikosh12");
 const FILE: &str = "board";
 
 /// Why there is no board.
@@ -827,14 +835,16 @@ impl Board {
 
     pub(crate) fn wake_all(&self) {
         for slot in self.slots() {
-            slot.bed.call_whoever_sleeps();
-            slot.porch.call_whoever_sleeps();
-            slot.lobbies.iter().for_each(Bed::call_whoever_sleeps);
+            slot.beds().for_each(Bed::call_whoever_sleeps);
         }
     }
 
     pub(crate) fn index_of(&self, role: Role) -> Option<usize> {
         self.slots().iter().position(|slot| slot.role() == Some(role))
+    }
+
+    pub(crate) fn watches(&self) -> &[Watch; PLACES] {
+        &self.header().watches
     }
 
     fn header(&self) -> &Header {

@@ -32,9 +32,10 @@ mod snapshot;
 mod topic;
 pub mod transport;
 mod wait;
+mod watch;
 
 pub use allocations::CountingAllocator;
-pub use awake::{AwakeError, cores_to_keep_awake, keep_awake};
+pub use awake::{AwakeError, cores_to_keep_awake, run_when_idle};
 pub use board::{Board, BoardError, Role, SlotStatus, State};
 pub use checkpoint::{Checkpoint, CheckpointCopy, kept_by};
 pub use domain::{Domain, DomainError};

@@ -1,6 +1,7 @@
 //! Waiting for another process: yield for a while, then sleep on a futex in shared memory.
 
 use crate::pace::now_ns;
+use crate::watch::Watch;
 use core::sync::atomic::{AtomicU32, Ordering, fence};
 use rustix::event::Timespec;
 use rustix::thread::futex;
@@ -30,18 +31,39 @@ impl Default for WaitPolicy {
 /// How long a sleeper sleeps before it looks whether those it waits for still live.
 const SLEEP_NS: u64 = 100_000_000;
 
-/// Where processes sleep until somebody calls. It lives in shared memory, on a cache line of its own: in the common
-/// case callers only read it, and find that nobody sleeps.
+/// Cores that have a place of their own in every bed; any more share them.
+pub(crate) const PLACES: usize = 8;
+
+/// Where processes sleep until somebody calls, each in the place of its core. It lives in shared memory, on a cache line
+/// of its own: in the common case callers only read it, and find that nobody sleeps.
 ///
 /// Any number may sleep in it, and one call wakes all. Whoever dies or is frozen in it leaves nothing behind but a call
 /// that nobody hears: it is the caller who notes that nobody sleeps any more.
+#[cfg_attr(test, derive(Default))]
 #[repr(C, align(64))]
 pub(crate) struct Bed {
+    places: [Place; PLACES],
+}
+
+/// Where those sleep who have gone to sleep on one core.
+#[cfg_attr(test, derive(Default))]
+#[repr(C)]
+struct Place {
     /// Changes with every call: the futex.
     ticket: AtomicU32,
-    /// Not 0 if somebody may sleep.
-    is_taken: AtomicU32,
+    /// Whether somebody may sleep.
+    guests: AtomicU32,
 }
+
+/// Of [`Place::guests`].
+const NOBODY: u32 = 0;
+const ASLEEP: u32 = 1;
+/// Somebody sleeps, and it is left to the [`Watch`] of that core to wake them.
+const CALLED: u32 = 2;
+
+/// In so much time a watch that is awake has found out that it was told. Woken by the caller itself, on another core than
+/// its own, they cost it several times as much.
+const TELLING_NS: u64 = 2_000;
 
 /// Whoever looks at its watch so much too late did not run, and perhaps nobody could.
 const OVERSLEPT_NS: u64 = 500_000;
@@ -93,7 +115,7 @@ impl Bed {
     /// Polls until it returns something: at first giving way to others, then sleeping in between. After
     /// each sleep `check` may end the wait. At `due_ns`, if there is such a time, it ends with nothing.
     ///
-    /// Nothing is lost: that somebody sleeps is written before the last poll, and a caller reads it after what it
+    /// Nothing is lost: that somebody sleeps is noted before the last poll, and a caller reads it after what it
     /// calls for is visible. Both are separated by sequential consistency, so that the sleeper sees the event or
     /// the caller sees the sleeper.
     pub(crate) fn wait<T, E>(
@@ -121,13 +143,12 @@ impl Bed {
             time_ns = now_ns();
         }
         while !patience.is_over(time_ns) {
-            let ticket = self.ticket.load(Ordering::Acquire);
-            self.is_taken.store(1, Ordering::Relaxed);
-            fence(Ordering::SeqCst);
+            let place = &self.places[place_of(rustix::thread::sched_getcpu())];
+            let ticket = place.take();
             if let Some(value) = poll()? {
                 return Ok(Some(value));
             }
-            let woken = self.sleep(ticket, patience.left_ns(time_ns).min(SLEEP_NS));
+            let woken = place.sleep(ticket, patience.left_ns(time_ns).min(SLEEP_NS));
             if let Some(value) = poll()? {
                 return Ok(Some(value));
             }
@@ -139,9 +160,40 @@ impl Bed {
 
     /// Wakes all who sleep. What they are woken for has been written before, sequentially consistent with what follows.
     pub(crate) fn call(&self) {
-        if self.is_taken.load(Ordering::SeqCst) != 0 && self.is_taken.swap(0, Ordering::SeqCst) != 0 {
-            self.call_whoever_sleeps();
+        self.places.iter().for_each(Place::call);
+    }
+
+    /// As [`Bed::call`], but those who sleep on other cores are left to the watches there, as far as somebody keeps them,
+    /// who are told in which slot to look.
+    pub(crate) fn call_by(&self, watches: &[Watch; PLACES], slot: usize) {
+        if !self.places.iter().any(Place::has_guests) {
+            return;
         }
+        if self.leave_to_watches(place_of(rustix::thread::sched_getcpu()), watches, slot) {
+            let until_ns = now_ns().saturating_add(TELLING_NS);
+            while self.places.iter().any(Place::is_left_to_watch) && now_ns() < until_ns {
+                core::hint::spin_loop();
+            }
+        }
+        // Whoever sleeps on this core, where nobody keeps watch, or where something else runs than the watch.
+        self.call();
+    }
+
+    /// Leaves those who sleep in other places than this to whoever keeps watch there. Whether there is anybody.
+    fn leave_to_watches(&self, own: usize, watches: &[Watch; PLACES], slot: usize) -> bool {
+        let mut is_left = false;
+        for (index, (place, watch)) in self.places.iter().zip(watches).enumerate() {
+            if index != own && watch.is_kept() && place.leave_to_watch() {
+                watch.tell(slot);
+                is_left = true;
+            }
+        }
+        is_left
+    }
+
+    /// Wakes those who are left to the watch of this core.
+    pub(crate) fn answer(&self, core: usize) {
+        self.places[place_of(core)].answer();
     }
 
     /// As [`Bed::call`], for what was written in whatever order.
@@ -152,6 +204,51 @@ impl Bed {
 
     /// Wakes all who sleep, though a caller may have been killed after it had noted that nobody does.
     pub(crate) fn call_whoever_sleeps(&self) {
+        self.places.iter().for_each(Place::wake);
+    }
+}
+
+/// The place of this core in every bed, and its watch's among all.
+pub(crate) fn place_of(core: usize) -> usize {
+    core % PLACES
+}
+
+impl Place {
+    /// Says that somebody is about to sleep. Nothing is lost if what it waits for is looked at once more before it does.
+    fn take(&self) -> u32 {
+        let ticket = self.ticket.load(Ordering::Acquire);
+        // Who is left to the watch is not to be forgotten: it calls this guest, too.
+        let _ = self.guests.compare_exchange(NOBODY, ASLEEP, Ordering::SeqCst, Ordering::SeqCst);
+        fence(Ordering::SeqCst);
+        ticket
+    }
+
+    fn has_guests(&self) -> bool {
+        self.guests.load(Ordering::SeqCst) != NOBODY
+    }
+
+    fn call(&self) {
+        if self.has_guests() && self.guests.swap(NOBODY, Ordering::SeqCst) != NOBODY {
+            self.wake();
+        }
+    }
+
+    /// Whether it has done so: nobody else is about to call.
+    fn leave_to_watch(&self) -> bool {
+        self.guests.compare_exchange(ASLEEP, CALLED, Ordering::SeqCst, Ordering::SeqCst).is_ok()
+    }
+
+    fn is_left_to_watch(&self) -> bool {
+        self.guests.load(Ordering::SeqCst) == CALLED
+    }
+
+    fn answer(&self) {
+        if self.guests.compare_exchange(CALLED, NOBODY, Ordering::SeqCst, Ordering::SeqCst).is_ok() {
+            self.wake();
+        }
+    }
+
+    fn wake(&self) {
         self.ticket.fetch_add(1, Ordering::SeqCst);
         // Fails only for an address that is not mapped, and `self` is.
         let _ = futex::wake(&self.ticket, futex::Flags::empty(), u32::MAX >> 1);
@@ -175,7 +272,7 @@ mod tests {
 
     /// Lets so many sleep in one bed, and calls once when they do. Returns what woke each.
     fn woken_by(sleepers: usize, call: impl FnOnce(&Bed)) -> Vec<Woken> {
-        let bed = Bed { ticket: AtomicU32::new(0), is_taken: AtomicU32::new(0) };
+        let bed = Bed::default();
         let looks = AtomicU32::new(0);
         let policy = WaitPolicy { yield_for: Duration::ZERO, up_early: Duration::ZERO };
         std::thread::scope(|scope| {
@@ -197,6 +294,19 @@ mod tests {
         })
     }
 
+    /// As if somebody kept them.
+    fn watches() -> [Watch; PLACES] {
+        let watches: [Watch; PLACES] = Default::default();
+        watches.iter().for_each(Watch::keep);
+        watches
+    }
+
+    /// Calls from a core on which nobody sleeps.
+    fn call_from_elsewhere(bed: &Bed, watches: &[Watch; PLACES]) {
+        bed.leave_to_watches(PLACES, watches, 0);
+        bed.call();
+    }
+
     #[test]
     fn one_call_wakes_all_who_sleep() {
         assert_eq!(woken_by(3, Bed::call_after_fence), [Woken::Called; 3]);
@@ -204,7 +314,8 @@ mod tests {
 
     #[test]
     fn a_sleeper_is_called_also_if_a_caller_was_killed_before_it_woke_anybody() {
-        let was_killed = |bed: &Bed| bed.is_taken.store(0, Ordering::SeqCst);
+        let was_killed =
+            |bed: &Bed| bed.places.iter().for_each(|place| place.guests.store(NOBODY, Ordering::SeqCst));
         let woken = woken_by(1, |bed| {
             was_killed(bed);
             bed.call_whoever_sleeps();
@@ -215,6 +326,65 @@ mod tests {
             bed.call();
         });
         assert_eq!(woken, [Woken::TimedOut], "who sleeps was noted to be awake");
+    }
+
+    #[test]
+    fn who_keeps_watch_wakes_those_who_are_left_to_it() {
+        let woken = woken_by(3, |bed| {
+            let (watches, is_over) = (&watches(), &AtomicU32::new(0));
+            std::thread::scope(|scope| {
+                scope.spawn(move || {
+                    while is_over.load(Ordering::SeqCst) == 0 {
+                        let told = watches.iter().any(|watch| watch.ask() & 1 != 0);
+                        (0..PLACES).filter(|_| told).for_each(|core| bed.answer(core));
+                        std::hint::spin_loop();
+                    }
+                });
+                call_from_elsewhere(bed, watches);
+                is_over.store(1, Ordering::SeqCst);
+            });
+        });
+        assert_eq!(woken, [Woken::Called; 3]);
+    }
+
+    #[test]
+    fn who_is_left_to_a_watch_that_does_not_answer_is_woken_by_the_caller() {
+        assert_eq!(woken_by(3, |bed| call_from_elsewhere(bed, &watches())), [Woken::Called; 3]);
+    }
+
+    #[test]
+    fn a_watch_answers_alone_for_whom_no_caller_wakes() {
+        let woken = woken_by(1, |bed| {
+            let watches = watches();
+            bed.leave_to_watches(PLACES, &watches, 70);
+            let told = watches.iter().fold(0, |told, watch| told | watch.ask());
+            assert_eq!(told, 1 << 6, "slot 70 is slot 6 to them");
+            (0..PLACES).for_each(|core| bed.answer(core));
+        });
+        assert_eq!(woken, [Woken::Called]);
+    }
+
+    #[test]
+    fn a_guest_who_comes_while_others_are_left_to_the_watch_does_not_keep_them_asleep() {
+        let place = Place::default();
+        let first = place.take();
+        assert!(place.leave_to_watch());
+        let second = place.take();
+        assert!(place.is_left_to_watch(), "the newcomer has taken the call away");
+        place.answer();
+        for ticket in [first, second] {
+            assert_eq!(place.sleep(ticket, 60_000 * MS), Woken::Called, "it slept though it had been called");
+        }
+    }
+
+    #[test]
+    fn nobody_is_left_to_a_watch_that_nobody_keeps() {
+        let bed = Bed::default();
+        for place in &bed.places {
+            place.take();
+        }
+        bed.leave_to_watches(0, &Default::default(), 0);
+        assert!(!bed.places.iter().any(Place::is_left_to_watch));
     }
 
     #[test]

@@ -7,17 +7,18 @@ use crate::prepare::Prepared;
 use mikoshi_config::scenario::{Clock, KeepAwake};
 use mikoshi_runtime::cores_to_keep_awake;
 use rustix::process::Signal;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 /// A process that keeps them awake until this is dropped.
 pub struct Awake(Child);
 
 impl Awake {
-    /// Of this run; none where they may sleep.
+    /// Of this run, in this directory; none where they may sleep.
     ///
     /// # Errors
     /// The program is missing or can't be started.
-    pub fn keep(prepared: &Prepared) -> Result<Option<Self>, Failure> {
+    pub fn keep(prepared: &Prepared, run: &Path) -> Result<Option<Self>, Failure> {
         let scenario = &prepared.run.scenario;
         let is_wished = match scenario.placement.keep_awake {
             KeepAwake::Never => false,
@@ -32,6 +33,7 @@ impl Awake {
         }
         let program = binaries::find(AWAKE)?;
         let mut command = Command::new(&program);
+        command.arg("--run").arg(run);
         command.args(cores.iter().flat_map(|core| ["--core".to_owned(), core.to_string()]));
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         let child = end_with_this_thread(&mut command, Signal::KILL).spawn();

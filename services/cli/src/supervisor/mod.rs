@@ -142,7 +142,7 @@ impl Supervisor {
         }
         // While services set themselves up.
         let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
-        Self::of(prepared, (member, tap), team_tap, requests, children, succession)
+        Self::of((prepared, directory), (member, tap), team_tap, requests, children, succession)
     }
 
     /// Processes are adopted last: until then nothing happens to them.
@@ -154,7 +154,7 @@ impl Supervisor {
         let team_tap = TeamTap::new(&tap, run.robots.len(), schedule.clock()).map_err(Failure::fault)?;
         let requests = Requests::listen(directory).map_err(Failure::fault)?;
         let children = Children::adopt(directory, logs, services_of(prepared))?;
-        Self::of(prepared, (member, tap), team_tap, requests, children, succession)
+        Self::of((prepared, directory), (member, tap), team_tap, requests, children, succession)
     }
 
     /// Its processes are somebody else's: they are neither started nor ended, and nobody is given up.
@@ -165,13 +165,14 @@ impl Supervisor {
         let requests = Requests::listen(directory).map_err(Failure::fault)?;
         notify::tell_ready("waits for the services");
         let (children, succession) = (Children::of(directory, logs), Succession::with_limit(0));
-        let supervisor = Self::of(prepared, (member, tap), team_tap, requests, children, succession)?;
+        let supervisor =
+            Self::of((prepared, directory), (member, tap), team_tap, requests, children, succession)?;
         Ok(Self { attended: Some(BTreeMap::new()), ..supervisor })
     }
 
     /// With all that it takes, and nothing has happened yet.
     fn of(
-        prepared: &Prepared,
+        (prepared, directory): (&Prepared, &Path),
         (member, tap): (Member, IceoryxTap),
         team_tap: TeamTap<IceoryxTap>,
         requests: Requests,
@@ -188,7 +189,7 @@ impl Supervisor {
             lost: BTreeSet::new(),
             stands_by: false,
             attended: None,
-            _awake: Awake::keep(prepared)?,
+            _awake: Awake::keep(prepared, directory)?,
         })
     }
 

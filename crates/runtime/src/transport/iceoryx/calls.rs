@@ -81,10 +81,8 @@ impl Process {
             let slot = self.slot_at(*source);
             tick.zip(slot).is_none_or(|(tick, slot)| slot.bell(source.place).has_rung_for(tick))
         };
-        if gathering.inputs.iter().all(is_there)
-            && let Some(slot) = self.member.board().slots().get(gathering.slot)
-        {
-            slot.bed.call();
+        if gathering.inputs.iter().all(is_there) {
+            self.member.board().call(gathering.slot, |slot| &slot.bed);
         }
     }
 
@@ -118,12 +116,11 @@ impl Process {
     /// Wakes those who sleep for what was sent, if they have not been.
     pub(super) fn call_sleepers(&self) {
         self.sent.set(0);
-        if let Some(source) = self.unsaid.take()
-            && let Some(slot) = self.slot_at(source)
-        {
-            slot.lobby(source.phase).call();
-            if let Some(link) = self.link.and_then(|link| self.member.board().slots().get(link)) {
-                link.bed.call();
+        if let Some(source) = self.unsaid.take() {
+            let board = self.member.board();
+            board.call(source.slot, |slot| slot.lobby(source.phase));
+            if let Some(link) = self.link {
+                board.call(link, |slot| &slot.bed);
             }
         }
     }
