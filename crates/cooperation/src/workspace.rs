@@ -16,6 +16,8 @@ const MEAN_ROUNDS: usize = 8;
 /// Buffers for n arms. Nothing in them outlives a call.
 #[derive(Clone, Debug)]
 pub struct WorkspaceScratch {
+    /// From each hand to the tip of its stick, in the world.
+    pub(crate) levers: Vec<Vector3<f64>>,
     pub(crate) tips: Vec<Pose<World, Tip>>,
     pub(crate) tip_wrenches: Vec<Wrench<World>>,
     pub(crate) tip_twists: Vec<Twist<World>>,
@@ -30,6 +32,7 @@ impl WorkspaceScratch {
     pub fn new(internal_forces: &InternalForces) -> Self {
         let (n, work) = (internal_forces.arms(), internal_forces.work_len());
         Self {
+            levers: vec![Vector3::zeros(); n],
             tips: vec![Pose::identity(); n],
             tip_wrenches: vec![Wrench::zero(); n],
             tip_twists: vec![Twist::zero(); n],
@@ -43,6 +46,7 @@ impl WorkspaceScratch {
     /// Overwrites every number with NaN.
     pub fn poison(&mut self) {
         let nan = Vector3::from_element(f64::NAN);
+        self.levers.fill(nan);
         self.tips.fill(nan_pose());
         for wrenches in [&mut self.tip_wrenches, &mut self.row_wrenches, &mut self.work_wrenches] {
             wrenches.fill(Wrench::new(nan, nan));
@@ -61,11 +65,11 @@ impl WorkspaceScratch {
         h: &mut GeneralizedForce,
         z: &mut GeneralizedPosition,
     ) {
-        for ((tip, tip_wrench), (stick, X_WH, f_H_W)) in
-            self.tips.iter_mut().zip(&mut self.tip_wrenches).zip(hands)
-        {
+        let tips = self.tips.iter_mut().zip(&mut self.tip_wrenches).zip(&mut self.levers);
+        for (((tip, tip_wrench), lever), (stick, X_WH, f_H_W)) in tips.zip(hands) {
             *tip = stick.tip_pose(&X_WH);
-            *tip_wrench = stick.tip_wrench(&X_WH, &f_H_W);
+            *lever = stick.vector(&X_WH);
+            *tip_wrench = f_H_W.shifted(&-*lever);
         }
 
         // Eq. 27, row 0. What the tips deviate from it is left in `tip_twists`.

@@ -1,8 +1,9 @@
 //! Where the object is, if its grasps yield.
 
 use mikoshi_config::scenario::Scenario;
-use mikoshi_cooperation::{HandInput, VirtualStick};
-use mikoshi_spatial::{Hand, Pose, Twist, World, Wrench};
+use mikoshi_cooperation::HandInput;
+use mikoshi_spatial::{Twist, World, Wrench};
+use nalgebra::Vector3;
 
 /// How grasps yield, which no encoder sees.
 ///
@@ -38,7 +39,7 @@ impl GraspCompliance {
     }
 
     /// How far the object is from the mean of the sticks' tips (eq. 27), by the hands' filtered wrenches,
-    /// which go one tick on. `shares` are the tips' weights in that mean, and in what they bear of the
+    /// which go one tick on. With each hand comes the lever from it to its tip, in the world. `shares` are the tips' weights in that mean, and in what they bear of the
     /// external wrench (W⁻); hands without a share take no part.
     ///
     /// Unless the object `is_free`, only the internal part of the wrenches counts. An object that something
@@ -47,36 +48,31 @@ impl GraspCompliance {
     pub(crate) fn object_yield<'a>(
         &self,
         filtered: &mut [[f64; 6]],
-        hands: impl Iterator<Item = (&'a HandInput, &'a VirtualStick)> + Clone,
+        hands: impl Iterator<Item = (&'a HandInput, &'a Vector3<f64>)> + Clone,
         shares: &[f64],
         is_free: bool,
     ) -> Twist<World> {
         let mut held = Wrench::zero();
-        for ((filtered, share), (hand, stick)) in filtered.iter_mut().zip(shares).zip(hands.clone()) {
+        for ((filtered, share), (hand, lever)) in filtered.iter_mut().zip(shares).zip(hands.clone()) {
             for (filtered, wrench) in filtered.iter_mut().zip(hand.wrench.to_array()) {
                 *filtered = wrench + self.filter_pole * (*filtered - wrench);
             }
             if !is_free && *share != 0.0 {
-                held += stick.tip_wrench(&hand.pose, &Wrench::from_array(filtered));
+                held += Wrench::from_array(filtered).shifted(&-lever);
             }
         }
         let mut mean = Twist::zero();
-        for ((filtered, share), (hand, stick)) in filtered.iter().zip(shares).zip(hands) {
-            let on_holder = stick.hand_wrench(&hand.pose, &(held * *share));
+        for ((filtered, share), (_, lever)) in filtered.iter().zip(shares).zip(hands) {
+            let on_holder = (held * *share).shifted(lever);
             let on_object = Wrench::from_array(filtered) - on_holder;
-            mean += self.tip_yield(&hand.pose, stick, &on_object) * *share;
+            mean += self.tip_yield(lever, &on_object) * *share;
         }
         mean
     }
 
-    /// How far the point of the object is displaced where the tip of a hand's stick is.
-    pub(crate) fn tip_yield(
-        &self,
-        X_WH: &Pose<World, Hand>,
-        stick: &VirtualStick,
-        wrench: &Wrench<World>,
-    ) -> Twist<World> {
-        self.grip_yield(wrench).shifted(&stick.vector(X_WH))
+    /// How far the point of the object is displaced where the tip of a hand's stick is, by the lever from hand to tip.
+    pub(crate) fn tip_yield(&self, lever: &Vector3<f64>, wrench: &Wrench<World>) -> Twist<World> {
+        self.grip_yield(wrench).shifted(lever)
     }
 
     /// How far the object is displaced in a hand's grip.
@@ -88,17 +84,22 @@ impl GraspCompliance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mikoshi_spatial::Object;
-    use nalgebra::{UnitQuaternion, Vector3};
+    use mikoshi_cooperation::VirtualStick;
+    use mikoshi_spatial::{Hand, Object, Pose};
+    use nalgebra::UnitQuaternion;
 
     fn hand(y: f64, force: Vector3<f64>, moment: Vector3<f64>) -> HandInput {
         let pose = Pose::<World, Hand>::new(Vector3::new(0.0, y, 0.0), UnitQuaternion::identity());
         HandInput { pose, pose_commanded: pose, wrench: Wrench::new(force, moment) }
     }
 
+    fn levers(hands: &[HandInput; 2]) -> [Vector3<f64>; 2] {
+        let X_WA = Pose::<World, Object>::identity();
+        hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &X_WA).vector(&hand.pose))
+    }
+
     fn found(compliance: &GraspCompliance, hands: &[HandInput; 2], is_free: bool) -> Twist<World> {
-        let sticks = hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &Pose::<World, Object>::identity()));
-        compliance.object_yield(&mut [[0.0; 6]; 2], hands.iter().zip(&sticks), &[0.5, 0.5], is_free)
+        compliance.object_yield(&mut [[0.0; 6]; 2], hands.iter().zip(&levers(hands)), &[0.5, 0.5], is_free)
     }
 
     #[test]
@@ -144,9 +145,9 @@ mod tests {
         let compliance = GraspCompliance { m_n: 1e-3, rad_nm: 0.0, filter_pole: 0.9 };
         let pull = Vector3::new(0.0, 10.0, 0.0);
         let hands = [hand(0.5, pull, Vector3::zeros()), hand(-0.5, -pull, Vector3::zeros())];
-        let sticks = hands.map(|hand| VirtualStick::at_grasp(&hand.pose, &Pose::<World, Object>::identity()));
         let mut filtered = [[0.0; 6]; 2];
-        let found = compliance.object_yield(&mut filtered, hands.iter().zip(&sticks), &[1.0, 0.0], true);
+        let found =
+            compliance.object_yield(&mut filtered, hands.iter().zip(&levers(&hands)), &[1.0, 0.0], true);
         assert!((found.linear.y + 0.001).abs() < 1e-12, "a tenth of 10 N by 1 mm/N: {found:?}");
     }
 }

@@ -6,6 +6,7 @@
 //! robot, or fewer than two, do not carry on: between them there is nothing to share.
 
 use crate::grasp::GraspCompliance;
+use crate::tips::Tip;
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::scenario::{LostGrasp, Scenario};
 use mikoshi_cooperation::{Gap, HandInput, HybridState, Parting, PartingLimits};
@@ -138,9 +139,11 @@ impl Grips {
         gaps: &[Twist<World>; MAX_HANDS_OF_TEAM],
     ) {
         let X_AW = seen.X_WA.inverse();
-        for (arm, (at_start, gap)) in state.at_start.iter_mut().zip(gaps).enumerate() {
-            if let Some((tip, _)) = self.tip(hybrid, seen, arm) {
-                *at_start = (tip - *gap).expressed_in(&X_AW).to_array();
+        let hands = seen.hands.iter().zip(seen.hand_wrench);
+        let of_hands = state.at_start.iter_mut().zip(gaps).zip(hands);
+        for (arm, ((at_start, gap), (hand, wrench))) in of_hands.enumerate() {
+            if let Some(tip) = Tip::of(hybrid, arm, hand, seen.X_WA) {
+                *at_start = (self.off(&tip, wrench) - *gap).expressed_in(&X_AW).to_array();
             }
         }
     }
@@ -150,19 +153,21 @@ impl Grips {
     pub(crate) fn find_gaps(
         &self,
         state: &GripState,
-        hybrid: &HybridState<MAX_HANDS_OF_TEAM>,
+        tips: &[Option<Tip>],
         seen: &Seen<'_>,
         gaps: &mut [Option<Gap>],
     ) {
         let R_AW = seen.X_WA.rotation.inverse();
-        let at_start = state.at_start.iter().zip(&state.yielded_at_start).zip(seen.hand_wrench);
-        for (arm, (gap, ((at_start, yielded_at_start), wrench))) in gaps.iter_mut().zip(at_start).enumerate()
+        let hands = tips.iter().zip(seen.hands).zip(seen.hand_wrench);
+        let at_start = state.at_start.iter().zip(&state.yielded_at_start);
+        for (gap, ((at_start, yielded_at_start), ((tip, hand), wrench))) in
+            gaps.iter_mut().zip(at_start.zip(hands))
         {
-            *gap = self.tip(hybrid, seen, arm).map(|(tip, hand)| {
+            *gap = tip.as_ref().map(|tip| {
                 let at_start = Twist::<Object>::from_array(at_start).expressed_in(seen.X_WA);
                 let doubt = (self.yielded(&R_AW, wrench) - Twist::from_array(yielded_at_start)) * DOUBT;
                 Gap {
-                    tip: tip - at_start,
+                    tip: self.off(tip, wrench) - at_start,
                     lever: hand.pose.translation - seen.X_WA.translation,
                     doubt: Parting { m: doubt.linear.norm(), rad: doubt.angular.norm() },
                 }
@@ -179,17 +184,9 @@ impl Grips {
         Twist::new(R_AW * in_world.linear, R_AW * in_world.angular)
     }
 
-    /// From the team's object to where the tip of an arm that takes part has it, less what its grasp yields.
-    fn tip<'a>(
-        &self,
-        hybrid: &HybridState<MAX_HANDS_OF_TEAM>,
-        seen: &Seen<'a>,
-        arm: usize,
-    ) -> Option<(Twist<World>, &'a HandInput)> {
-        let (hand, wrench) = (seen.hands.get(arm)?, seen.hand_wrench.get(arm)?);
-        let stick = hybrid.stick(arm).filter(|_| hybrid.takes_part(arm))?;
-        let yielded = self.compliance.tip_yield(&hand.pose, &stick, &Wrench::from_array(wrench));
-        Some((seen.X_WA.displacement_to(&stick.tip_pose(&hand.pose).relabel()) + yielded, hand))
+    /// Where this tip has the object, less what its grasp yields, from where the team has it.
+    fn off(&self, tip: &Tip, wrench: &[f64; 6]) -> Twist<World> {
+        tip.off + self.compliance.tip_yield(&tip.lever, &Wrench::from_array(wrench))
     }
 
     /// How far each hand has parted from its grip, as a multiple of what it may.

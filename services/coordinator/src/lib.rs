@@ -23,6 +23,7 @@ mod rig;
 mod safety;
 mod step_clock;
 mod tick;
+mod tips;
 
 pub use build::{BuildCoordinatorError, build_hybrid_law, build_internal_forces, team_arms};
 pub use participant::CoordinatorParticipant;

@@ -11,13 +11,12 @@
 
 use crate::build::BuildCoordinatorError;
 use crate::grasp::GraspCompliance;
+use crate::tips::Tip;
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::scenario::Scenario;
-use mikoshi_cooperation::{
-    Control, FrameCorrection, HandInput, HybridLaw, HybridState, Landmark, LandmarkParameters, Sighting,
-};
+use mikoshi_cooperation::{Control, HybridLaw, HybridState, Landmark, LandmarkParameters, Sighting};
 use mikoshi_ipc_types::{MAX_HANDS_OF_TEAM, MAX_ROBOTS};
-use mikoshi_spatial::{Hand, Object, Odometry, Pose, Twist, World, Wrench, exp};
+use mikoshi_spatial::{Hand, Odometry, Pose, Twist, World, Wrench, exp};
 use nalgebra::Vector3;
 
 /// Robots that walk with .04 m/s part by .25 mm/s, and by four times that where feet are believed to stand where
@@ -85,9 +84,9 @@ impl LevelFrame {
         is_valid.then(|| Pose::new(Vector3::new(x_m, y_m, 0.0), exp(&Vector3::new(0.0, 0.0, yaw_rad))))
     }
 
-    fn corrected(&self, correction: &FrameCorrection) -> Self {
-        let moved = correction.motion().transform_point(&Vector3::new(self.x_m, self.y_m, 0.0));
-        Self { x_m: moved.x, y_m: moved.y, yaw_rad: self.yaw_rad + correction.yaw }
+    fn moved(&self, motion: &Pose<World, World>, yaw_rad: f64) -> Self {
+        let moved = motion.transform_point(&Vector3::new(self.x_m, self.y_m, 0.0));
+        Self { x_m: moved.x, y_m: moved.y, yaw_rad: self.yaw_rad + yaw_rad }
     }
 }
 
@@ -105,24 +104,23 @@ impl OdometryFrames {
         Ok(Self { landmark: (scenario.odometry.landmark && !parts_hands).then_some(landmark) })
     }
 
-    /// One tick of a team that steps with its object in its hands. `None`, and nothing has changed, if a stick
-    /// is none.
+    /// One tick of a team that steps with its object in its hands.
     pub(crate) fn correct(
         &self,
         state: &mut OdometryState,
         hybrid: &mut HybridState<MAX_HANDS_OF_TEAM>,
         seen: &Seen<'_>,
-    ) -> Option<()> {
-        let Some(landmark) = &self.landmark else { return Some(()) };
+    ) {
+        let Some(landmark) = &self.landmark else { return };
         let mut sightings = [Sighting::default(); MAX_ROBOTS];
         let mut arms = 0..0;
         for (sighting, &count) in sightings.iter_mut().zip(seen.hands_of_robots) {
             arms = arms.end..arms.end + count;
-            *sighting = seen.sighting(hybrid, arms.clone())?;
+            *sighting = seen.sighting(arms.clone());
         }
-        let sightings = sightings.get(..seen.hands_of_robots.len())?;
         let mut references = hybrid.hand_pose_ref.iter_mut();
         let robots = state.frames.iter_mut().zip(seen.hands_of_robots);
+        let (sightings, _) = sightings.split_at(seen.hands_of_robots.len().min(MAX_ROBOTS));
         let corrections = landmark.corrections(sightings).zip(sightings);
         for ((frame, &count), (correction, sighting)) in robots.zip(corrections) {
             let references = references.by_ref().take(count);
@@ -131,24 +129,22 @@ impl OdometryFrames {
                 references.for_each(drop);
                 continue;
             }
-            *frame = frame.corrected(&correction);
+            let motion = correction.motion();
+            *frame = frame.moved(&motion, correction.yaw);
             for array in references {
                 // Where they are none the law says so in the next tick.
                 if let Some(X_WH) = Pose::<World, Hand>::from_array(array) {
-                    *array = (correction.motion() * X_WH).to_array();
+                    *array = (motion * X_WH).to_array();
                 }
             }
         }
-        Some(())
     }
 }
 
 /// What the team sees of the object in a tick.
 pub(crate) struct Seen<'a> {
-    /// The object, by the mean of all tips.
-    pub X_WA: &'a Pose<World, Object>,
-    /// All hands, in hand order.
-    pub hands: &'a [HandInput],
+    /// Where each hand has the object, in hand order.
+    pub tips: &'a [Option<Tip>],
     /// What each applies, filtered.
     pub hand_wrench: &'a [[f64; 6]],
     /// Weight of each tip in the mean of all (W⁻).
@@ -161,23 +157,18 @@ pub(crate) struct Seen<'a> {
 
 impl Seen<'_> {
     /// Of the robot whose arms these are.
-    fn sighting(
-        &self,
-        hybrid: &HybridState<MAX_HANDS_OF_TEAM>,
-        arms: core::ops::Range<usize>,
-    ) -> Option<Sighting> {
+    fn sighting(&self, arms: core::ops::Range<usize>) -> Sighting {
         let (mut weight, mut tips, mut deviation) = (0.0, Vector3::zeros(), Twist::zero());
-        let holding = || arms.clone().filter(|&arm| hybrid.takes_part(arm));
-        let each = 1.0 / holding().count().max(1) as f64;
-        for arm in holding() {
-            let (stick, hand) = (hybrid.stick(arm)?, self.hands.get(arm)?);
-            let wrench = Wrench::from_array(self.hand_wrench.get(arm)?);
-            let X_WB = stick.tip_pose(&hand.pose);
-            let yielded = self.compliance.tip_yield(&hand.pose, &stick, &wrench);
-            weight += self.shares.get(arm)?;
-            tips += X_WB.translation * each;
-            deviation += (self.X_WA.displacement_to(&X_WB.relabel()) + yielded) * each;
+        let hands = self.tips.iter().zip(self.hand_wrench).zip(self.shares);
+        let hands = hands.skip(arms.start).take(arms.len());
+        let holding = hands.filter_map(|((tip, wrench), share)| Some((tip.as_ref()?, wrench, share)));
+        let each = 1.0 / holding.clone().count().max(1) as f64;
+        for (tip, wrench, share) in holding {
+            weight += share;
+            tips += tip.position * each;
+            deviation +=
+                (tip.off + self.compliance.tip_yield(&tip.lever, &Wrench::from_array(wrench))) * each;
         }
-        Some(Sighting { weight, tips, deviation })
+        Sighting { weight, tips, deviation }
     }
 }

@@ -13,6 +13,7 @@ use crate::operator::{Operator, OperatorState};
 use crate::reference::References;
 use crate::safety::{Safety, SafetyState};
 use crate::step_clock::{TeamClockState, Wishes, step_timing};
+use crate::tips::Tip;
 use bytemuck::{Pod, Zeroable};
 use mikoshi_config::RunSpec;
 use mikoshi_cooperation::{
@@ -127,6 +128,8 @@ struct TeamScratch {
     formation: Formation,
     /// What each hand applies to the object, filtered.
     hand_wrench: Vec<[f64; 6]>,
+    /// Where each hand has the object.
+    tips: Vec<Option<Tip>>,
     gaps: Vec<Option<Gap>>,
 }
 
@@ -253,6 +256,7 @@ impl Coordinator {
                 law: self.law.scratch(),
                 formation: self.law.internal_forces().whole().clone(),
                 hand_wrench: vec![[0.0; 6]; arms],
+                tips: vec![None; arms],
                 gaps: vec![None; arms],
             },
             law_output: self.law.output(),
@@ -401,8 +405,11 @@ impl Coordinator {
         state.load.write(&mut out.team_state);
         out.team_state.drive_silent_ticks = self.operator.silent_ticks(&state.operator, tick);
         out.team_state.awaited_word = self.job.awaited(&phase);
-        if is_hybrid && !is_led && !state.clock.is_standing() {
-            self.correct_odometry(state, &team.formation, hands, law_output);
+        if is_hybrid && !is_led {
+            Tip::fill(&mut team.tips, &state.hybrid, hands, &law_output.position.external);
+            if !state.clock.is_standing() {
+                self.correct_odometry(state, team);
+            }
         }
         if carries && !is_blind {
             let now = Now { tick, law: law_output, hands, is_free };
@@ -451,24 +458,15 @@ impl Coordinator {
     }
 
     /// The team steps with the object in its hands, which tells how far robots' odometries have parted.
-    fn correct_odometry(
-        &self,
-        state: &mut CoordinatorState,
-        formation: &Formation,
-        hands: &[HandInput],
-        law: &HybridOutput,
-    ) {
+    fn correct_odometry(&self, state: &mut CoordinatorState, team: &TeamScratch) {
         let seen = odometry::Seen {
-            X_WA: &law.position.external,
-            hands,
+            tips: &team.tips,
             hand_wrench: &state.hand_wrench,
-            shares: formation.w_inverse(),
+            shares: team.formation.w_inverse(),
             hands_of_robots: &self.hands_of_robots,
             compliance: &self.compliance,
         };
-        // A stick that is none was refused before anything changed.
-        let corrected = self.odometry.correct(&mut state.odometry, &mut state.hybrid, &seen);
-        debug_assert!(corrected.is_some(), "sticks were read in this tick");
+        self.odometry.correct(&mut state.odometry, &mut state.hybrid, &seen);
     }
 
     /// Whether all hands that take part still hold; who doesn't is left out from the next tick on.
@@ -485,7 +483,7 @@ impl Coordinator {
         // A leader's followers are not where the law would have them.
         if !is_led {
             let seen = grips::Seen { X_WA: &now.law.position.external, hands: now.hands, hand_wrench };
-            self.grips.find_gaps(grips, hybrid, &seen, &mut team.gaps);
+            self.grips.find_gaps(grips, &team.tips, &seen, &mut team.gaps);
             self.grips.find_slips(&team.gaps, hand_slip);
         }
         let Some(loss) = self.grips.find_loss(grips, hybrid, hand_slip, robots) else { return Ok(()) };
@@ -694,13 +692,13 @@ impl Coordinator {
         hands: &[HandInput],
         is_free: bool,
     ) -> Result<Twist<World>, CoordinateError> {
-        let mut sticks = [VirtualStick { X_HB: Pose::identity() }; MAX_HANDS_OF_TEAM];
-        for (stick, array) in sticks.iter_mut().zip(&state.hybrid.sticks).take(hands.len()) {
-            stick.X_HB = Pose::from_array(array).ok_or(CoordinateError::State)?;
+        let mut levers = [Vector3::zeros(); MAX_HANDS_OF_TEAM];
+        for (arm, (lever, hand)) in levers.iter_mut().zip(hands).enumerate() {
+            *lever = state.hybrid.stick(arm).ok_or(CoordinateError::State)?.vector(&hand.pose);
         }
         let TeamScratch { formation, hand_wrench, .. } = team;
         hand_wrench.iter_mut().zip(&state.hand_wrench).for_each(|(wrench, last)| *wrench = *last);
-        let hands = hands.iter().zip(&sticks);
+        let hands = hands.iter().zip(&levers);
         Ok(self.compliance.object_yield(hand_wrench, hands, formation.w_inverse(), is_free))
     }
 
@@ -746,6 +744,7 @@ impl CoordinatorScratch {
         self.team.law.poison();
         self.team.formation.poison();
         self.team.hand_wrench.fill([nan; 6]);
+        self.team.tips.fill(None);
         self.team.gaps.fill(None);
         self.hands.clear();
         self.load.poison();

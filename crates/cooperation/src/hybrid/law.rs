@@ -4,9 +4,7 @@ use super::{
     BuildHybridLawError, HandInput, HandReference, HybridError, HybridInputs, HybridOutput, HybridParameters,
     HybridReference, HybridScratch, HybridState,
 };
-use crate::{
-    FormedForces, GeneralizedForce, GeneralizedPosition, InternalForces, VirtualStick, WorkspaceScratch,
-};
+use crate::{FormedForces, GeneralizedForce, GeneralizedPosition, InternalForces, WorkspaceScratch};
 use core::f64::consts::PI;
 use mikoshi_spatial::{CoordinateFrame, Hand, Object, Pose, Twist, World, Wrench};
 use nalgebra::{Vector3, Vector6};
@@ -106,19 +104,19 @@ impl HybridLaw {
             return Ok(());
         };
 
-        let giving_way = self.external_giving_way(h_c, reference, &forces, sticks, inputs.hands);
+        let giving_way = self.external_giving_way(h_c, reference, &forces, &workspace.levers);
         self.deal_out_errors(h_c, z_c, reference, &giving_way, &forces, workspace);
         let object_twist = self.feed_forward(reference);
-        for ((((out, pose), hand), stick), (tip, lacking)) in references
+        for ((((out, pose), hand), lever), (tip, lacking)) in references
             .iter_mut()
             .zip(hand_pose_ref.iter())
             .zip(inputs.hands)
-            .zip(sticks.iter())
+            .zip(&workspace.levers)
             .zip(workspace.tip_twists.iter().zip(&workspace.tip_wrenches))
         {
             // The object and all hands move as one body.
             let twist = object_twist.shifted(&(hand.pose.translation - z_c.external.translation));
-            let feedback = self.feedback(stick, &hand.pose, tip, lacking);
+            let feedback = self.feedback(lever, tip, lacking);
             // Deviation from eq. 38, which adds to measured joint angles: that turns every servo's droop,
             // divided by kz, into a standing error. References integrate, and measurement closes the loop
             // through z_c alone.
@@ -128,9 +126,9 @@ impl HybridLaw {
             *out = HandReference { pose, twist, wrench: Wrench::zero() };
         }
         self.deal_out_forces(h_c, z_c, reference, &forces, workspace);
-        let tips = sticks.iter().zip(&workspace.tip_wrenches);
-        for ((out, hand), (stick, tip)) in references.iter_mut().zip(inputs.hands).zip(tips) {
-            out.wrench = stick.hand_wrench(&hand.pose, tip);
+        let tips = workspace.levers.iter().zip(&workspace.tip_wrenches);
+        for (out, (lever, tip)) in references.iter_mut().zip(tips) {
+            out.wrench = tip.shifted(lever);
         }
         store(state, references);
         Ok(())
@@ -229,24 +227,21 @@ impl HybridLaw {
         h_c: &GeneralizedForce,
         reference: &HybridReference,
         forces: &FormedForces<'_>,
-        sticks: &[VirtualStick],
-        hands: &[HandInput],
+        levers: &[Vector3<f64>],
     ) -> Twist<World> {
         let Some(row) = self.rows.first().filter(|row| row.is_force != Vector6::zeros()) else {
             return Twist::zero();
         };
         let HybridParameters { kz, kh, period_s, approach_limit_m_s, approach_limit_rad_s, .. } =
             &self.parameters;
-        let mut levers = Vector3::zeros();
+        let mut squared = Vector3::zeros();
         let formation = forces.formation();
-        let arms = sticks.iter().zip(hands).enumerate();
-        for (_, (stick, hand)) in arms.filter(|(arm, _)| formation.takes_part(*arm)) {
-            let l = stick.vector(&hand.pose);
-            levers += Vector3::repeat(l.norm_squared()) - l.component_mul(&l);
+        for (_, l) in levers.iter().enumerate().filter(|(arm, _)| formation.takes_part(*arm)) {
+            squared += Vector3::repeat(l.norm_squared()) - l.component_mul(l);
         }
         let n = formation.arms() as f64;
-        let by_levers = |lever: f64| if lever > 0.0 { lever / kh.m_n } else { 0.0 };
-        let turning = levers.map(|lever| 1.0 / (n / kh.rad_nm + by_levers(lever)));
+        let by_levers = |squared: f64| if squared > 0.0 { squared / kh.m_n } else { 0.0 };
+        let turning = squared.map(|squared| 1.0 / (n / kh.rad_nm + by_levers(squared)));
         let lacking = row.force_error(&reference.force.external, &h_c.external);
         let (linear, angular) = (lacking.force * (kh.m_n / n), lacking.moment.component_mul(&turning));
         // k_z of it is what one tick brings.
@@ -308,17 +303,11 @@ impl HybridLaw {
     /// is up to 1 + l² k/k_φ times as stiff one way as another, and one number is too small for moments in
     /// the hands or too large for long sticks. Hand by hand it is as stiff as a hand is, all errors shrink
     /// alike, and the object is not moved, whatever its size and that of the team.
-    fn feedback(
-        &self,
-        stick: &VirtualStick,
-        X_WH: &Pose<World, Hand>,
-        tip: &Twist<World>,
-        lacking: &Wrench<World>,
-    ) -> Twist<World> {
+    fn feedback(&self, lever: &Vector3<f64>, tip: &Twist<World>, lacking: &Wrench<World>) -> Twist<World> {
         let HybridParameters { kz, kh, .. } = &self.parameters;
-        let lacking = stick.hand_wrench(X_WH, lacking);
+        let lacking = lacking.shifted(lever);
         let giving_way = Twist::new(lacking.force * kh.m_n, lacking.moment * kh.rad_nm);
-        (stick.hand_displacement(X_WH, tip) + giving_way) * *kz
+        (tip.shifted(&-lever) + giving_way) * *kz
     }
 
     /// The object's reference twist on its position axes. Beyond the paper, whose law lags a moving
@@ -389,6 +378,8 @@ fn store<const CAPACITY: usize>(state: &mut HybridState<CAPACITY>, references: &
 
 /// `v` shortened to `limit`, and whether it was longer.
 fn shortened(v: Vector3<f64>, limit: f64) -> (Vector3<f64>, bool) {
-    let norm = v.norm();
-    if norm > limit { (v * (limit / norm), true) } else { (v, false) }
+    if v.norm_squared() <= limit * limit {
+        return (v, false);
+    }
+    (v * (limit / v.norm()), true)
 }
