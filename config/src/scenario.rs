@@ -459,8 +459,8 @@ pub struct Placement {
     /// How long before a tick is due whoever begins it gets up, and gives way to others from then on: a core that
     /// sleeps is woken up late. With 0 it is woken when the tick is due. By the clock only.
     pub early_us: u32,
-    /// When cores of the services are kept from falling asleep, by threads of the supervisor that run only while
-    /// nobody else wants to. Without pins, cores are those of the machine if it has no more than there are services.
+    /// When cores of the services are kept from falling asleep, by threads that run only while nobody else wants to, and
+    /// wake services that sleep there. Without pins, cores are those of the machine if it has no more than there are services.
     pub keep_awake: KeepAwake,
     /// What to do about a right that a service asks for and doesn't have.
     pub rt: MissingRights,
