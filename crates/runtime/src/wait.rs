@@ -377,14 +377,20 @@ mod tests {
         }
     }
 
-    #[test]
-    fn nobody_is_left_to_a_watch_that_nobody_keeps() {
+    /// The places whose guests are left to a watch by a caller on this core, of a bed with guests in all.
+    fn left_by_caller_on(own: usize, watches: &[Watch; PLACES]) -> Vec<usize> {
         let bed = Bed::default();
         for place in &bed.places {
             place.take();
         }
-        bed.leave_to_watches(0, &Default::default(), 0);
-        assert!(!bed.places.iter().any(Place::is_left_to_watch));
+        bed.leave_to_watches(own, watches, 0);
+        (0..PLACES).filter(|index| bed.places[*index].is_left_to_watch()).collect()
+    }
+
+    #[test]
+    fn guests_are_left_to_watches_that_are_kept_on_other_cores() {
+        assert_eq!(left_by_caller_on(0, &Default::default()), [0; 0]);
+        assert_eq!(left_by_caller_on(3, &watches()), [0, 1, 2, 4, 5, 6, 7]);
     }
 
     #[test]
