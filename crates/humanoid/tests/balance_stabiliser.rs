@@ -344,6 +344,37 @@ fn the_foot_that_bears_too_much_is_drawn_up() {
     assert!((out.sole_offset.right.linear.z + height).abs() < 1e-12);
 }
 
+/// Whose left foot bears all, as far past where it is wanted.
+fn bearing_aside(off_m: f64) -> StabiliserInputs {
+    let mut inputs = balanced();
+    inputs.standing.right = None;
+    inputs.com_ref = inputs.standing.left.map_or(inputs.com_ref, |foot| foot.translation.xy());
+    inputs.com = inputs.com_ref;
+    let weight = PENDULUM.weight_n();
+    inputs.ground_wrench.right = Wrench::zero();
+    inputs.ground_wrench.left =
+        Wrench::new(Vector3::new(0.0, 0.0, weight), Vector3::new(off_m * weight, 0.0, 0.0));
+    inputs
+}
+
+#[test]
+fn a_sole_that_has_turned_on_an_edge_comes_to_rest_without_a_blow() {
+    let stabiliser = Stabiliser::new(config());
+    let mut state = StabiliserState::default();
+    let on_edge_then_flat = [0.04, 0.0].map(|off_m| vec![bearing_aside(off_m); 60]).concat();
+    let rates = on_edge_then_flat.iter().map(|inputs| {
+        let before = state.sole_tilt.left.x;
+        stabiliser.act(&mut state, inputs);
+        (state.sole_tilt.left.x - before) / DT
+    });
+    let rates: Vec<f64> = rates.collect();
+    let fastest = rates.iter().copied().fold(0.0, f64::max);
+    assert!(fastest > 0.2, "it turns at {fastest} rad/s only");
+    let blow = rates.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    assert!(blow < 0.5 * config().edge_max_rad_s, "its speed changes by {blow} rad/s at once");
+    assert!(state.sole_turning.left == Vector2::zeros(), "{:?}", state.sole_turning.left);
+}
+
 #[test]
 fn in_the_air_everything_is_forgotten() {
     let stabiliser = Stabiliser::new(StabiliserConfig { com_admittance_1_s2: 10.0, ..config() });

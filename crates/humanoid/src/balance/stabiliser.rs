@@ -113,6 +113,12 @@ const LIGHTEST: f64 = 4.0;
 /// Share of the weight below which a foot does not say where it bears.
 const LEAST_SHARE: f64 = 0.1;
 
+/// Time constant in which a sole comes to rest that has found the ground: damped drives answer a turn that ends at once by a
+/// blow that throws the centre of pressure to the other edge \[s\].
+const EDGE_SETTLE_S: f64 = 0.015;
+/// Share of the patience below which what is left of a turn is nothing.
+const EDGE_SETTLED: f64 = 0.02;
+
 /// Of the drives for which [`StabiliserConfig::standard`] is.
 const STANDARD_DAMPING_NMS_RAD: f64 = 500.0;
 
@@ -273,8 +279,7 @@ impl Stabiliser {
                 let most = patience + config.edge_max_rad_s / config.edge_rad_s2_nm.max(1e-9);
                 *turning = turning.zip_map(&off, |turning, off| {
                     let beyond = off - off.clamp(-usual, usual);
-                    // At once at rest where the sole has found the ground.
-                    let kept = if beyond * turning > 0.0 { turning } else { 0.0 };
+                    let kept = if beyond * turning > 0.0 { turning } else { settled(turning, patience, dt) };
                     (kept + beyond * dt).clamp(-most, most)
                 });
                 let turned = turning.map(|turning| turning - turning.clamp(-patience, patience));
@@ -328,6 +333,14 @@ impl Stabiliser {
             }
         }
     }
+}
+
+/// What is left after a tick of the turning of a sole that stands on no edge any more: what is past the patience, and so turns
+/// the sole, fades within [`EDGE_SETTLE_S`]; then all is forgotten.
+fn settled(turning: f64, patience: f64, dt: f64) -> f64 {
+    let turns = turning - turning.clamp(-patience, patience);
+    let fades = turns.abs() > EDGE_SETTLED * patience;
+    if fades { turning - turns * (dt / EDGE_SETTLE_S).min(1.0) } else { 0.0 }
 }
 
 const _: () = assert!(size_of::<StabiliserState>() == 15 * size_of::<f64>());
