@@ -2,7 +2,7 @@
 //! to the hybrid law.
 //!
 //! ```text
-//!                        without a job: start of the law
+//!                        without a job: start of the law, or drives at their limits before
 //!   Waiting ──────────────────────────────────────────────────────────▶ Carrying
 //!      │ start                                                             ▲ │
 //!      ▼        in reach            all hold              time      lifted │ │ motion over,
@@ -36,7 +36,8 @@ const UNLOADED_SHARE: f64 = 0.05;
 /// What the team is to do, and for how long. Immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Job {
-    /// Hands hold from the beginning; the hybrid law starts at a tick, or never.
+    /// Hands hold from the beginning; the hybrid law starts at a tick, or never. What strains somebody's drives past their
+    /// limits before, it is there to relieve: then it starts at once.
     Hold {
         /// When.
         hybrid_start: Option<u64>,
@@ -113,6 +114,8 @@ pub(crate) struct Seen {
     pub applied_n: f64,
     /// The operator's last word about the job that was not followed yet; 0 if none.
     pub asked: u64,
+    /// A robot's drives are at their limits, and not for a moment.
+    pub is_strained: bool,
 }
 
 /// A [`Phase`] as words, for the state.
@@ -156,7 +159,7 @@ impl Job {
         let steps = match self {
             Self::Hold { hybrid_start } => {
                 return match phase {
-                    Phase::Waiting if hybrid_start.is_some_and(|start| tick >= start) => {
+                    Phase::Waiting if hybrid_start.is_some_and(|start| tick >= start || seen.is_strained) => {
                         Phase::Carrying { since }
                     }
                     _ => phase,
@@ -409,6 +412,7 @@ mod tests {
         carried_n: 30.0,
         applied_n: 30.0,
         asked: 0,
+        is_strained: false,
     };
     const HELD: Seen = Seen { all_hold: true, ..NOTHING };
 
@@ -426,7 +430,11 @@ mod tests {
             job.next(carrying, 5000, &Seen { motion_is_over: true, team_stands: true, ..HELD }),
             carrying
         );
-        assert_eq!(Job::Hold { hybrid_start: None }.next(Phase::Waiting, u64::MAX, &NOTHING), Phase::Waiting);
+        let never = Job::Hold { hybrid_start: None };
+        assert_eq!(never.next(Phase::Waiting, u64::MAX, &NOTHING), Phase::Waiting);
+        let strained = Seen { is_strained: true, ..NOTHING };
+        assert_eq!(job.next(Phase::Waiting, 12, &strained), Phase::Carrying { since: 12 });
+        assert_eq!(never.next(Phase::Waiting, 12, &strained), Phase::Waiting);
         assert!(job.closes_hands(&Phase::Waiting) && job.closes_hands(&carrying));
     }
 

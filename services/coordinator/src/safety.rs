@@ -69,6 +69,14 @@ impl SafetyState {
         self.blind != 0 || matches!(self.cause, stop_cause::INPUT | stop_cause::STALE)
     }
 
+    /// Whether somebody's drives are at their limits, and not for a moment: sooner than the team stops for it.
+    pub(crate) fn is_strained(&self) -> bool {
+        let torque = stop_cause::ALL.iter().position(|cause| *cause == stop_cause::TORQUE);
+        let for_ticks =
+            |lasted: &[u64; CAUSES]| torque.and_then(|cause| lasted.get(cause).copied()).unwrap_or(0);
+        self.lasted.iter().any(|lasted| for_ticks(lasted) >= PATIENCE_TICKS)
+    }
+
     /// Stops a team that has lost a hand of this robot; `is_blind` if it can't go on without that hand. What
     /// stopped it before stays.
     pub(crate) fn stop(&mut self, cause: u64, robot: usize, is_blind: bool) {
@@ -228,6 +236,17 @@ mod tests {
         }
         let torque = |robot: &mut RobotState| robot.flags |= flag::TORQUE_LIMIT;
         assert_eq!(stopped_at(torque), Some((109, stop_cause::TORQUE, 2)));
+        let (safety, mut state, mut robot) = (safety(), SafetyState::default(), well());
+        torque(&mut robot);
+        let strained_after = (1..).find(|_| {
+            safety.look(&mut state, core::iter::once((&robot, 0b11)), true, SILENCE);
+            state.is_strained()
+        });
+        assert_eq!(
+            (strained_after, state.is_stopped()),
+            (Some(PATIENCE_TICKS), false),
+            "long before the team stops"
+        );
         let stale = |robot: &mut RobotState| robot.flags |= flag::INPUT_MISSING;
         assert_eq!(stopped_at(stale), Some((24, stop_cause::STALE, 2)));
         const { assert!(PATIENCE_TICKS < 20) };

@@ -681,6 +681,7 @@ impl Coordinator {
             carried_n: law.force.external.force.z,
             applied_n: law.force.external.force.norm(),
             asked: state.operator.asked,
+            is_strained: state.safety.is_strained(),
         }
     }
 
