@@ -13,7 +13,7 @@ COMMA := ,
 DDS = $(shell pkg-config --exists CycloneDDS && command -v idlc)
 ALL_PEERS = --features zenoh$(if $(DDS),$(COMMA)dds)
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo view watch second-engine link test test-peers test-view test-second-engine test-link test-systemd bench bench-parts peers lint package
+.PHONY: help setup build demo three-kinds view watch second-engine link test test-peers test-view test-second-engine test-link test-systemd bench bench-parts peers lint package
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-18s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,6 +29,9 @@ build: setup ## Build target/release/mikoshi and the services beside it
 
 demo: build ## Four robots walk and carry one object
 	$(RELEASE)/mikoshi run config/scenarios/transport.toml
+
+three-kinds: build ## Robots of three kinds carry one object (Talos' description is fetched from PyPI, once)
+	@described=$$(scripts/setup-talos) && eval "$$described" && $(RELEASE)/mikoshi run config/scenarios/kinds/3.toml
 
 view: build ## Build target/release/mikoshi-view, too, with which `mikoshi view` shows runs
 	$(CARGO) build $(VIEW)

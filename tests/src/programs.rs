@@ -50,6 +50,14 @@ fn build(folder: &Path) {
     assert!(built.success(), "the programs under test can't be built");
 }
 
+/// Where Talos' description lies: by the environment, or where `scripts/setup-talos` puts it. Nothing is fetched by a test.
+pub fn described_robots() -> Option<PathBuf> {
+    let fetched =
+        || Some(folder().parent()?.join("example-robot-data/cmeel.prefix/share/example-robot-data/robots"));
+    let robots = env::var_os("EXAMPLE_ROBOT_DATA").map(PathBuf::from).or_else(fetched)?;
+    robots.join("talos_data/robots/talos_reduced_box.urdf").exists().then_some(robots)
+}
+
 /// The root of the sources.
 pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("this package lies in the workspace")

@@ -66,7 +66,8 @@ pub fn run(scenario: &Path, arguments: &[&str], results: &Results) -> Said {
     say(&mut run_command(scenario, arguments, results))
 }
 
-fn run_command(scenario: &Path, arguments: &[&str], results: &Results) -> Command {
+/// What [`run`] runs, to be changed.
+pub fn run_command(scenario: &Path, arguments: &[&str], results: &Results) -> Command {
     let mut command = mikoshi();
     command.args(["run", "--quiet", "--out"]).arg(results.path()).arg(scenario).args(arguments);
     command

@@ -1,6 +1,7 @@
 //! Section 4.4: teams of all sizes walk and carry, each judged by its scenario.
 
-use mikoshi_tests::run::{Results, run};
+use mikoshi_tests::programs::described_robots;
+use mikoshi_tests::run::{Results, run, run_command, say};
 use mikoshi_tests::scenarios::of_project;
 
 #[test]
@@ -25,6 +26,25 @@ fn robots_of_two_kinds_carry_together() {
     assert_eq!(said.status, Some(0), "{:#}", summary["failures"]);
     let joints = |robot: usize| summary["robots"][robot]["torque_peak_nm"].as_object().expect("joints").len();
     assert_eq!([joints(0), joints(1)], [32, 28]);
+}
+
+/// The same, and Talos, as a package describes it.
+#[test]
+fn robots_of_three_kinds_carry_together() {
+    let Some(robots) = described_robots() else {
+        return eprintln!(
+            "not tested here: Talos' description is missing, which scripts/setup-talos fetches"
+        );
+    };
+    let results = Results::new();
+    let mut command = run_command(&of_project("kinds/3"), &["--in-process", "--no-log"], &results);
+    let said = say(command.env("EXAMPLE_ROBOT_DATA", robots));
+    assert_eq!(said.status, Some(0), "{said:#?}");
+    let summary = results.summary();
+    let joints = |robot: usize| summary["robots"][robot]["torque_peak_nm"].as_object().expect("joints").len();
+    assert_eq!([joints(0), joints(1), joints(2)], [32, 28, 32]);
+    let steps = |robot: usize| summary["robots"][robot]["steps"].as_u64();
+    assert!((0..4).all(|robot| steps(robot) > Some(30)), "all of them walk");
 }
 
 /// Odometries part with every step, and by the way between them the object's turn would move hands against each
