@@ -54,15 +54,16 @@ bench-parts: build ## Time the parts of a tick, kinematics beside Pinocchio's (w
 	@scripts/setup-pinocchio
 	MIKOSHI_PINOCCHIO="$(abspath $(TARGET))/pinocchio" $(CARGO) bench --workspace --bench parts
 
-package: build ## Make the Debian package, target/package/mikoshi.deb
+package: link ## Make the Debian package, target/package/mikoshi.deb
 	@$(CARGO) deb --version >/dev/null 2>&1 || $(CARGO) install --quiet --locked cargo-deb@3.8.0
 	rm -rf target/package
 	$(RELEASE)/mikoshi install --root target/package/root --prefix /usr
 	strip target/package/root/usr/bin/*
 	$(CARGO) deb --quiet --fast --no-build --package mikoshi --output target/package/mikoshi.deb
 
-test-systemd: package ## Test the package on a machine with systemd, in namespaces of its own (as root)
+test-systemd: package ## Test the package, and docs/cluster.md, on machines with systemd in namespaces (as root)
 	@scripts/test-systemd target/package/mikoshi.deb
+	@scripts/test-cluster target/package/mikoshi.deb
 
 test-peers: ## Test the other transports, too, that frames are compared over
 	$(if $(DDS),,@echo "peers: CycloneDDS is left out, since cyclonedds-dev, cyclonedds-tools or pkg-config is missing")
