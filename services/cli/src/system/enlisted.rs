@@ -172,7 +172,8 @@ mod tests {
         };
         let stage = ["link", "team", "recorder", "bridge", "coordinator", "coordinator-standby"];
         assert_eq!(units("stage"), stage.map(|name| format!("mikoshi-{name}.service")));
-        let of_b = ["link", "team", "servo@B", "servo-standby@B"].map(|name| format!("mikoshi-{name}.service"));
+        let of_b =
+            ["link", "team", "servo@B", "servo-standby@B"].map(|name| format!("mikoshi-{name}.service"));
         assert_eq!(units("b"), of_b);
         assert!(host_of(&scenario, Some("c")).is_err());
     }
