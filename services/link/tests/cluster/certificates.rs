@@ -32,10 +32,11 @@ fn goes_on(team: &mut Team<'_>, words: u64) {
 #[test]
 fn a_certificate_that_ends_during_a_walk_stops_the_team_and_with_a_new_one_it_goes_on() {
     let b = robot_host("B");
-    let plan = walk(2, 0.06, &["duration_s=18", "motion.random.duration_s=13"]);
+    let plan = walk(2, 0.06, &["duration_s=18", "motion.random.duration_s=12"]);
     let mut team = or_skip!(Team::gather(&plan));
     plan.certify(&["--host", &b, "--days", &(GOOD_FOR_S / 86_400.0).to_string()]);
     team.start();
+    team.wait_for_tick(600);
     let is_silent = || silence_s(&team, HEAD, &b) > SILENT_S;
     team.wait_until(2000, is_silent);
     let ended = team.tick(STAGE);

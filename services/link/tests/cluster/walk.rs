@@ -150,9 +150,9 @@ fn walk_of(team: &str, robots: &[&str], duration_s: u32) -> Value {
 
 #[test]
 fn four_robots_on_four_hosts_walk_and_meet_the_scenarios_thresholds() {
-    let summary = stopped_by(&[], || walk_of("four", &["A", "B", "C", "D"], 10));
+    let summary = stopped_by(&[], || walk_of("four", &["A", "B", "C", "D"], 11));
     if !summary.is_null() {
-        assert_eq!((&summary["ticks"], &summary["failures"]), (&2000.into(), &Value::Array(vec![])));
+        assert_eq!((&summary["ticks"], &summary["failures"]), (&2200.into(), &Value::Array(vec![])));
         let robots = summary["robots"].as_array().expect("a list");
         assert!(
             robots.len() == 4 && robots.iter().all(|robot| robot["steps"].as_u64() > Some(3)),
