@@ -149,6 +149,13 @@ fn walk_of(team: &str, robots: &[&str], duration_s: u32) -> Value {
 }
 
 #[test]
+#[ignore = "as that of four: its figures"]
+fn three_robots_on_three_hosts_walk() {
+    let summary = stopped_by(&[], || walk_of("three", &["A", "B", "C"], 11));
+    assert!(summary.is_null() || summary["failures"] == Value::Array(vec![]), "{}", summary["failures"]);
+}
+
+#[test]
 fn four_robots_on_four_hosts_walk_and_meet_the_scenarios_thresholds() {
     let summary = stopped_by(&[], || walk_of("four", &["A", "B", "C", "D"], 11));
     if !summary.is_null() {
