@@ -13,7 +13,7 @@ COMMA := ,
 DDS = $(shell pkg-config --exists CycloneDDS && command -v idlc)
 ALL_PEERS = --features zenoh$(if $(DDS),$(COMMA)dds)
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo three-kinds view watch second-engine link test test-peers test-view test-second-engine test-link test-systemd bench bench-parts peers lint package
+.PHONY: help setup build demo three-kinds view watch second-engine link test test-peers test-view test-second-engine test-link test-systemd tables bench bench-parts peers lint package
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-18s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -57,15 +57,20 @@ bench-parts: build ## Time the parts of a tick, kinematics beside Pinocchio's (w
 	@scripts/setup-pinocchio
 	MIKOSHI_PINOCCHIO="$(abspath $(TARGET))/pinocchio" $(CARGO) bench --workspace --bench parts
 
-package: build ## Make the Debian package, target/package/mikoshi.deb
+package: link ## Make the Debian package, target/package/mikoshi.deb
 	@$(CARGO) deb --version >/dev/null 2>&1 || $(CARGO) install --quiet --locked cargo-deb@3.8.0
 	rm -rf target/package
 	$(RELEASE)/mikoshi install --root target/package/root --prefix /usr
 	strip target/package/root/usr/bin/*
 	$(CARGO) deb --quiet --fast --no-build --package mikoshi --output target/package/mikoshi.deb
 
-test-systemd: package ## Test the package on a machine with systemd, in namespaces of its own (as root)
+test-systemd: package ## Test the package, and docs/cluster.md, on machines with systemd in namespaces (as root)
 	@scripts/test-systemd target/package/mikoshi.deb
+	@scripts/test-cluster target/package/mikoshi.deb
+
+tables: link ## Print tables of docs/results.md: robots that lose their servo, carriers on bad ways, a flood (as root)
+	SPEED=0.04 $(CARGO) test --release --workspace --test lost_servo -- --ignored --nocapture table
+	$(CARGO) test $(LINK) --test cluster -- --ignored --nocapture --test-threads 1
 
 test-peers: ## Test the other transports, too, that frames are compared over
 	$(if $(DDS),,@echo "peers: CycloneDDS is left out, since cyclonedds-dev, cyclonedds-tools or pkg-config is missing")

@@ -867,6 +867,9 @@ pub struct PlanArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub scenario: ScenarioArguments,
+    /// Say which delay and gain go with a way between hosts: what `mikoshi-link measure ask` printed, or a link's report
+    #[arg(long, value_name = "FILE.json")]
+    pub way: Option<PathBuf>,
     /// Print it as JSON
     #[arg(long)]
     pub json: bool,

@@ -53,6 +53,7 @@ mod top;
 mod viewer;
 mod wall_clock;
 pub mod watched_run;
+mod way;
 
 use arguments::{Arguments, Command, RenderArguments, ReplayArguments, RunArguments, WatchArguments};
 use clap::Parser;

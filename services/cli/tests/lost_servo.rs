@@ -276,10 +276,11 @@ fn concerns_servo(topic: Topic, robot: usize) -> bool {
 
 /// What becomes of two robots of which one is cut off while they walk, for this many ticks, and who go on later.
 fn cut_off(lost: usize, eighth: u64, ticks: u64) -> Fate {
-    // Once it is found it sets its feet where they belong; the team goes on when it stands.
-    let words = [12, 14, 16, 18].map(|at_s| format!("{{ at_s = {at_s}.0, says = \"resume\" }}"));
+    // Once it is found it sets its feet where they belong; the team goes on when it stands. Where hands run ahead of
+    // feet that are not there yet, a drive comes to its limit, and the team stops once more.
+    let words = [12, 14, 16, 18, 20].map(|at_s| format!("{{ at_s = {at_s}.0, says = \"resume\" }}"));
     let mut run = walk("two", 0.1, "0.5", &format!("[{}]", words.join(", ")));
-    run.ticks = 3800;
+    run.ticks = 4200;
     let from = WALKING + eighth * STEP / 8;
     let silent = from..from + ticks;
     fate(&run, lost, from, move |topic, tick| silent.contains(&tick) && concerns_servo(topic, lost))
@@ -295,8 +296,7 @@ fn a_servo_that_was_cut_off_until_its_plan_was_over_begins_anew_where_its_robot_
             fate.tilt_max_rad < 0.1 && fate.sunk_m < 0.03 && fate.margin_min_m > 0.0,
             "{eighth}: {fate:?}"
         );
-        // In the third of these phases one foot comes to bear a fifth of the robot, and it is not found ready.
-        assert!(eighth == 2 || !fate.stopped_in_the_end, "{eighth}: {fate:?}");
+        assert!(!fate.stopped_in_the_end, "{eighth}: {fate:?}");
     }
 }
 

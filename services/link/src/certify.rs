@@ -24,15 +24,28 @@ pub struct CertifyArguments {
     /// Only for this host
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
-    /// For how many days they are good
-    #[arg(long, value_name = "N", default_value_t = 365, value_parser = clap::value_parser!(i64).range(0..=3650))]
-    days: i64,
+    /// For how many days they are good, 3650 at most; a part of one will do
+    #[arg(long, value_name = "N", default_value_t = 365.0, value_parser = parse_days)]
+    days: f64,
 }
 
-/// For how long an authority is good.
-const AUTHORITY_DAYS: i64 = 3650;
+/// For how long an authority is good, and nobody longer.
+const AUTHORITY_DAYS: f64 = 3650.0;
+const DAY_S: f64 = 86_400.0;
 /// Clocks of hosts may differ by so much.
 const LEEWAY: Duration = Duration::hours(1);
+
+fn parse_days(text: &str) -> Result<f64, String> {
+    let days = text.parse().map_err(|_| format!("expected a number of days, found {text:?}"))?;
+    match (0.0..=AUTHORITY_DAYS).contains(&days) {
+        true => Ok(days),
+        false => Err(format!("expected 0 to {AUTHORITY_DAYS} days, found {days}")),
+    }
+}
+
+fn days(count: f64) -> Duration {
+    Duration::seconds_f64(count * DAY_S)
+}
 
 /// Makes them.
 ///
@@ -53,7 +66,7 @@ pub fn certify(arguments: &CertifyArguments) -> Result<(), ServeError> {
     for host in hosts.iter().filter(|host| is_meant(&host.name)) {
         let address = host.listen.rsplit_once(':').map_or(host.listen.as_str(), |(address, _)| address);
         let address = address.trim_matches(['[', ']']);
-        let (certificate, key) = certificate(&host.name, address, &authority, now, arguments.days)?;
+        let (certificate, key) = certificate(&host.name, address, &authority, now, days(arguments.days))?;
         write(&arguments.out.join(format!("{}.pem", host.name)), &certificate, 0o644, true)?;
         write(&arguments.out.join(format!("{}-key.pem", host.name)), &key, 0o600, true)?;
     }
@@ -76,7 +89,7 @@ fn authority(folder: &Path, now: OffsetDateTime) -> Result<Issuer<'static, KeyPa
     params.distinguished_name.push(DnType::CommonName, "Mikoshi team");
     params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
     params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
-    (params.not_before, params.not_after) = (now - LEEWAY, now + Duration::days(AUTHORITY_DAYS));
+    (params.not_before, params.not_after) = (now - LEEWAY, now + days(AUTHORITY_DAYS));
     let signed = params.self_signed(&pair).map_err(ServeError::fault)?;
     write(&key, &pair.serialize_pem(), 0o600, false)?;
     write(&certificate, &signed.pem(), 0o644, false)?;
@@ -89,7 +102,7 @@ fn certificate(
     address: &str,
     authority: &Issuer<'static, KeyPair>,
     now: OffsetDateTime,
-    days: i64,
+    good_for: Duration,
 ) -> Result<(String, String), ServeError> {
     let pair = KeyPair::generate().map_err(ServeError::fault)?;
     // Who connects knows the address, and the name stands where access is granted by it.
@@ -99,7 +112,7 @@ fn certificate(
     params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
     params.extended_key_usages =
         vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
-    (params.not_before, params.not_after) = (now - LEEWAY, now + Duration::days(days));
+    (params.not_before, params.not_after) = (now - LEEWAY, now + good_for);
     let signed = params.signed_by(&pair, authority).map_err(ServeError::fault)?;
     Ok((signed.pem(), pair.serialize_pem()))
 }

@@ -1,7 +1,8 @@
 //! Commands of a page are carried out in their order, in a folder that holds what a clone holds for them.
 //!
 //! A block of `sh` is run; one of `sh,no-run` is not, and a comment above it says why: `<!-- not run: … -->`. Every
-//! line of a block of `text,printed` must be printed by the block before it; `…` stands for anything.
+//! line of a block of `text,printed` must be printed by the block before it; `…` stands for anything. What is said
+//! `on-machines` of their own is carried out by `make test-systemd`, of one page.
 
 use crate::pages::{Block, Page};
 use mikoshi_tests::programs::{folder, workspace};
@@ -12,6 +13,9 @@ use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
+
+/// The page whose blocks are carried out on machines (`scripts/test-cluster`).
+const ON_MACHINES: &str = "docs/cluster.md";
 
 /// What a user has who has cloned and built the project.
 fn clone() -> TempDir {
@@ -63,7 +67,7 @@ fn is_printed(line: &str, printed: &str) -> bool {
 /// What goes wrong on a page.
 fn failures_of(page: &Page) -> Vec<String> {
     let (clone, mut printed) = (clone(), String::new());
-    let mut failures = vec![];
+    let (mut failures, mut is_elsewhere) = (vec![], false);
     for block in page.blocks() {
         let place = format!("{}:{}", page.path.display(), block.line);
         match block.kind.as_str() {
@@ -77,6 +81,15 @@ fn failures_of(page: &Page) -> Vec<String> {
             "sh,no-run" if !block.above.starts_with("<!-- not run: ") => {
                 failures.push(format!("{place}: nobody says why it is not run"));
             }
+            kind if kind.contains("on-machines") => {
+                // They print there.
+                is_elsewhere = true;
+                if page.path != Path::new(ON_MACHINES) {
+                    failures.push(format!("{place}: nobody carries this out"));
+                }
+                continue;
+            }
+            "text,printed" if is_elsewhere => {}
             "text,printed" => {
                 let missing = block.text.lines().filter(|line| !is_printed(line, &printed));
                 failures
@@ -84,6 +97,7 @@ fn failures_of(page: &Page) -> Vec<String> {
             }
             _ => {}
         }
+        is_elsewhere &= block.kind == "text,printed";
     }
     failures
 }
@@ -105,6 +119,7 @@ fn a_wrong_command_and_a_wrong_word_are_found() {
         fenced("sh", "mikoshi --version") + &fenced("text,printed", "mikoshi 7.…"),
         fenced("sh", "mikoshi --nonsense\ntrue"),
         fenced("sh,no-run", "make demo"),
+        fenced("sh,on-machines", "# desk\nmake demo"),
     ] {
         assert_eq!(failures_of(&page(&bad)).len(), 1, "{bad}");
     }

@@ -9,6 +9,7 @@ use crate::prepare::{Prepared, prepare};
 use crate::print::{print_error, print_json, print_out};
 use crate::pull::{Pull, pulls};
 use crate::table;
+use crate::way::WayReport;
 use core::fmt::Write as _;
 use mikoshi_config::RunSpec;
 use mikoshi_config::scenario::{Job, Motion, Scenario, Thresholds};
@@ -16,6 +17,7 @@ use mikoshi_cooperation::Control;
 use mikoshi_ipc_types::{MAX_HANDS, MAX_JOINTS, MAX_ROBOTS};
 use mikoshi_runtime::{Input, required_bytes};
 use serde::Serialize;
+use std::path::Path;
 
 /// Prints the plan.
 ///
@@ -23,7 +25,7 @@ use serde::Serialize;
 /// The scenario can't be run.
 pub fn plan(arguments: &PlanArguments) -> Result<(), Failure> {
     let prepared = prepare(&arguments.scenario)?;
-    let plan = Plan::of(&prepared)?;
+    let plan = Plan::of(&prepared, arguments.way.as_deref())?;
     if arguments.json {
         print_json(&plan)?;
     } else {
@@ -51,6 +53,8 @@ struct Plan<'a> {
     rows: Vec<Row<'a>>,
     matrices: Matrices,
     gains: GainReport,
+    /// What a way that was measured asks for.
+    way: Option<WayReport>,
     pulls: Vec<Pull>,
     burdens: Vec<RobotBurden>,
     schedule: Vec<Phase>,
@@ -97,8 +101,10 @@ struct Phase {
 }
 
 impl<'a> Plan<'a> {
-    fn of(prepared: &'a Prepared) -> Result<Self, Failure> {
+    fn of(prepared: &'a Prepared, way: Option<&Path>) -> Result<Self, Failure> {
         let (run, scenario) = (&prepared.run, &prepared.run.scenario);
+        let gains = GainReport::of(prepared);
+        let way = way.map(|file| WayReport::of(file, prepared, &gains)).transpose()?;
         let internal_forces = prepared.law.internal_forces();
         Ok(Self {
             scenario: &scenario.name,
@@ -117,7 +123,8 @@ impl<'a> Plan<'a> {
                 v: by_row(&internal_forces.v()),
                 u: by_row(&internal_forces.u()),
             },
-            gains: GainReport::of(prepared),
+            gains,
+            way,
             pulls: pulls(run)?,
             burdens: burdens(run)?,
             schedule: schedule(prepared),
@@ -173,6 +180,10 @@ impl<'a> Plan<'a> {
 
         title(&mut text, "Loop gain");
         text += &self.gains_text();
+        if let Some(way) = &self.way {
+            title(&mut text, "What the way that was measured asks for");
+            text += &way.to_text();
+        }
         title(
             &mut text,
             "Standing robots pulled by a leader of their kind (eq. 42): until the ZMP is at their toes",

@@ -78,6 +78,9 @@ fn enlisted(scenario: &Scenario, has_hardware: bool, host: Option<usize>) -> Vec
             format!("# From {SCENARIO}, section [placement].\n[Service]\nLimitRTPRIO={priority}\n")
         });
         all.push(named("mikoshi-link.service", right.unwrap_or_default()));
+        // Whoever starts the other hosts takes his time.
+        let patience = "# There are several hosts.\n[Service]\nTimeoutStartSec=infinity\n";
+        all.push(named("mikoshi-team.service", patience.to_owned()));
     }
     if is_here(ServiceId::Bridge) {
         // Everything is seen there.
@@ -167,9 +170,10 @@ mod tests {
             let host = host_of(&scenario, Some(name)).expect("it is one of them");
             enlisted(&scenario, false, host).into_iter().map(|one| one.unit).collect::<Vec<_>>()
         };
-        let stage = ["link", "recorder", "bridge", "coordinator", "coordinator-standby"];
+        let stage = ["link", "team", "recorder", "bridge", "coordinator", "coordinator-standby"];
         assert_eq!(units("stage"), stage.map(|name| format!("mikoshi-{name}.service")));
-        let of_b = ["link", "servo@B", "servo-standby@B"].map(|name| format!("mikoshi-{name}.service"));
+        let of_b =
+            ["link", "team", "servo@B", "servo-standby@B"].map(|name| format!("mikoshi-{name}.service"));
         assert_eq!(units("b"), of_b);
         assert!(host_of(&scenario, Some("c")).is_err());
     }

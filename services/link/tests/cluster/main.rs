@@ -5,6 +5,7 @@
 //! not allowed (root, namespaces, /dev/net/tun) the tests say so, and judge nothing.
 
 mod attacks;
+mod certificates;
 mod cuts;
 mod hosts;
 mod lockstep;

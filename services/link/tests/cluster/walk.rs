@@ -127,3 +127,43 @@ fn a_team_walks_over_ten_milliseconds() {
 fn a_team_whose_clock_is_the_coordinators_walks() {
     completes(0.2, 2, 0.06, &["link.clock=head"]);
 }
+
+/// Robots of which each has a host walk with a bad way to the coordinator, and a tick takes four times as long.
+fn walk_of(team: &str, robots: &[&str], duration_s: u32) -> Value {
+    let (team, duration) = (format!("team={team}"), format!("duration_s={duration_s}"));
+    let motion = format!("motion.random.duration_s={}", duration_s - 5);
+    let more =
+        [&*team, &duration, &motion, "slow_motion=4", "coordination_delay_ticks=2", "hybrid.loop_gain=0.06"];
+    let plan = Plan::of("service.toml", robots, &[&WALK[..], &more].concat(), false);
+    let mut team = or_skip!(Team::gather(&plan), Value::Null);
+    let head = team.cluster.index_of(HEAD);
+    team.cluster.wire.set(head, 0..robots.len() + 2, |way| *way = Way::bad(2.0));
+    team.start();
+    team.wait_for_tick(u64::from(duration_s) * 200 - 60);
+    tell(&team, HEAD);
+    tell(&team, &robot_host(robots[0]));
+    let summary = team.finish();
+    eprintln!("{} {} {}", summary["failures"], summary["object"], summary["internal"]);
+    eprintln!("{} {} {}", summary["timing"], summary["faults"], summary["robots"]);
+    summary
+}
+
+#[test]
+#[ignore = "as that of four: its figures"]
+fn three_robots_on_three_hosts_walk() {
+    let summary = stopped_by(&[], || walk_of("three", &["A", "B", "C"], 11));
+    assert!(summary.is_null() || summary["failures"] == Value::Array(vec![]), "{}", summary["failures"]);
+}
+
+#[test]
+fn four_robots_on_four_hosts_walk_and_meet_the_scenarios_thresholds() {
+    let summary = stopped_by(&[], || walk_of("four", &["A", "B", "C", "D"], 11));
+    if !summary.is_null() {
+        assert_eq!((&summary["ticks"], &summary["failures"]), (&2200.into(), &Value::Array(vec![])));
+        let robots = summary["robots"].as_array().expect("a list");
+        assert!(
+            robots.len() == 4 && robots.iter().all(|robot| robot["steps"].as_u64() > Some(3)),
+            "{robots:?}"
+        );
+    }
+}

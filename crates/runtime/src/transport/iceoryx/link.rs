@@ -6,6 +6,7 @@ use crate::board::{Board, Doorbell, Role, State};
 use crate::checkpoint;
 use crate::member::{Entry, JoinError, Member};
 use crate::pace::now_ns;
+use crate::pulse;
 use crate::transport::accept::{Verdict, judge};
 use crate::transport::{ConnectError, consumer_depth};
 use crate::wait::WaitPolicy;
@@ -85,6 +86,8 @@ impl IceoryxLink {
         due_ns: Option<u64>,
         poll: impl FnMut() -> Result<Option<T>, TickError>,
     ) -> Result<Option<T>, TickError> {
+        // There may be something to do in every turn: then it never waits.
+        pulse::beat();
         let member = &self.process.member;
         member.wait_until(&member.slot().bed, due_ns, poll)
     }
