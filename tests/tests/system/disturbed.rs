@@ -58,7 +58,7 @@ fn a_team_walks_over_slippery_soft_patches_that_it_knows_nothing_of() {
 #[test]
 fn a_team_whose_robot_lands_on_edges_of_boards_step_after_step_walks_on() {
     let short = [
-        "duration_s=20",
+        "duration_s=24.5",
         "thresholds.object_travel_min_m=",
         "thresholds.object_travel_min_rad=",
         "thresholds.internal_end_n=",
