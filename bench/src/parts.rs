@@ -183,6 +183,7 @@ fn gait() -> Spread {
         sole_heights: None,
         load: ExternalLoad::NONE,
         divergent_component: None,
+        soles_turn: PerFoot { right: false, left: false },
     };
     measure(&mut |_, count| {
         for _ in 0..count {

@@ -2,8 +2,8 @@
 //! whose robots share Σo.
 //!
 //! A robot knows where it is in Σo by the feet it stands on, and errs a little with every step: its own Σo,
-//! frame O, drifts in the true one. Gravity and flat ground keep its axis and height; what drifts are x, y and
-//! yaw. Nothing that a team feels tells how far all have drifted together, but its hands tell how far they have
+//! frame O, drifts in the true one. Gravity keeps its axis, and flat ground its height; what drifts are x, y and
+//! yaw, and on ground that is not flat the height. Nothing that a team feels tells how far all have drifted together, but its hands tell how far they have
 //! drifted apart, for the object is rigid. With a_i the displacement from the team's mean object (eq. 27) to
 //! where the tip of arm i has it, less what its grasp yields, robot r's hands see the object displaced by
 //!
@@ -18,7 +18,14 @@
 //! t_r = −(T/τ) ε_r (x, y),   ψ_r = −(T/τ) ε_r (yaw)
 //! ```
 //!
-//! Σ w_r t_r = 0 and Σ w_r ψ_r = 0, and shortened by one factor for all robots they stay so: the mean of the
+//! Heights within ±b of the mean are those of robots that stand on one plane, as each believes it does. With β the part
+//! of a height that is beyond, `β(z) = z − clamp(z, −b, b)`, frame O is raised or lowered at the rate 1/τ_z:
+//!
+//! ```text
+//! h_r = −(T/τ_z) (β(ε_r (z)) − Σ w_s β(ε_s (z)))
+//! ```
+//!
+//! Σ w_r t_r = 0, Σ w_r h_r = 0 and Σ w_r ψ_r = 0, and shortened by one factor for all robots they stay so: the mean of the
 //! tips is where it was, and nobody's error becomes the object's.
 
 use mikoshi_spatial::{Pose, Twist, World};
@@ -31,7 +38,11 @@ pub struct LandmarkParameters {
     pub period_s: f64,
     /// Time constant τ \[s\]: long beside the hybrid law and a step, over which a robot sways.
     pub time_constant_s: f64,
-    /// Fastest motion of a frame at its robot's tips \[m/s\].
+    /// Time constant τ_z of heights \[s\].
+    pub height_time_constant_s: f64,
+    /// b: within this of the mean no height is corrected \[m\].
+    pub height_tolerance_m: f64,
+    /// Fastest motion of a frame at its robot's tips, level and upright \[m/s\].
     pub limit_m_s: f64,
     /// Fastest turn of a frame \[rad/s\].
     pub limit_rad_s: f64,
@@ -40,9 +51,12 @@ pub struct LandmarkParameters {
 /// Why a landmark can't be used as asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BuildLandmarkError {
-    /// The time constant is not longer than the period, or one of both is not positive.
-    #[error("the time constant must be longer than the control period, and both positive")]
+    /// A time constant is not longer than the period, or one of them is not positive.
+    #[error("time constants must be longer than the control period, and all positive")]
     TimeConstant,
+    /// The tolerance of heights is negative or no number.
+    #[error("the tolerance of heights must be a length")]
+    HeightTolerance,
     /// A limit is not positive.
     #[error("limits of a frame's motion must be positive")]
     Limit,
@@ -64,6 +78,9 @@ pub struct Sighting {
 pub struct Landmark {
     /// T/τ.
     share: f64,
+    /// T/τ_z.
+    height_share: f64,
+    height_tolerance_m: f64,
     step_m: f64,
     step_rad: f64,
 }
@@ -74,15 +91,31 @@ impl Landmark {
     /// # Errors
     /// A parameter is out of range.
     pub fn new(parameters: &LandmarkParameters) -> Result<Self, BuildLandmarkError> {
-        let LandmarkParameters { period_s, time_constant_s, limit_m_s, limit_rad_s } = *parameters;
-        if !(period_s > 0.0 && time_constant_s > period_s && time_constant_s.is_finite()) {
+        let LandmarkParameters {
+            period_s,
+            time_constant_s,
+            height_time_constant_s,
+            height_tolerance_m,
+            limit_m_s,
+            limit_rad_s,
+        } = *parameters;
+        let is_longer = |seconds: f64| seconds > period_s && seconds.is_finite();
+        if !(period_s > 0.0 && is_longer(time_constant_s) && is_longer(height_time_constant_s)) {
             return Err(BuildLandmarkError::TimeConstant);
+        }
+        if !(height_tolerance_m >= 0.0) {
+            return Err(BuildLandmarkError::HeightTolerance);
         }
         if !(limit_m_s > 0.0 && limit_rad_s > 0.0) {
             return Err(BuildLandmarkError::Limit);
         }
-        let share = period_s / time_constant_s;
-        Ok(Self { share, step_m: limit_m_s * period_s, step_rad: limit_rad_s * period_s })
+        Ok(Self {
+            share: period_s / time_constant_s,
+            height_share: period_s / height_time_constant_s,
+            height_tolerance_m,
+            step_m: limit_m_s * period_s,
+            step_rad: limit_rad_s * period_s,
+        })
     }
 
     /// By what each robot's frame O moves in Σo in this tick, in the order of `sightings`:
@@ -92,28 +125,41 @@ impl Landmark {
         sightings: &'a [Sighting],
     ) -> impl Iterator<Item = FrameCorrection> + use<'a> {
         let mean = sightings.iter().fold(Twist::zero(), |sum, seen| sum + seen.deviation * seen.weight);
-        let share = self.share;
-        let step = move |seen: &Sighting| (seen.deviation - mean) * -share;
-        let (mut longest, mut widest) = (0.0_f64, 0.0_f64);
+        let tolerance_m = self.height_tolerance_m;
+        let beyond = move |seen: &Sighting| {
+            let height = seen.deviation.linear.z - mean.linear.z;
+            height - height.clamp(-tolerance_m, tolerance_m)
+        };
+        let mean_beyond = sightings.iter().fold(0.0, |sum, seen| sum + beyond(seen) * seen.weight);
+        let (share, height_share) = (self.share, self.height_share);
+        let step = move |seen: &Sighting| {
+            let level = (seen.deviation - mean) * -share;
+            let height = (beyond(seen) - mean_beyond) * -height_share;
+            Twist::<World>::new(level.linear.xy().push(height), level.angular)
+        };
+        let (mut longest, mut highest, mut widest) = (0.0_f64, 0.0_f64, 0.0_f64);
         for step in sightings.iter().map(step) {
             longest = longest.max(step.linear.xy().norm());
+            highest = highest.max(step.linear.z.abs());
             widest = widest.max(step.angular.z.abs());
         }
         // The same for all, or the mean would move.
         let slower = 1.0_f64.min(self.step_m / longest).min(self.step_rad / widest);
+        let slower_up = 1.0_f64.min(self.step_m / highest);
         sightings.iter().map(move |seen| {
-            let step = step(seen) * slower;
-            FrameCorrection { about: seen.tips, linear: step.linear.xy().push(0.0), yaw: step.angular.z }
+            let step = step(seen);
+            let linear = (step.linear.xy() * slower).push(step.linear.z * slower_up);
+            FrameCorrection { about: seen.tips, linear, yaw: step.angular.z * slower }
         })
     }
 }
 
-/// A small motion of a frame on level ground.
+/// A small motion of a frame that stays level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameCorrection {
     /// The vertical through this point is what it turns about \[m\].
     pub about: Vector3<f64>,
-    /// What it moves by, level \[m\].
+    /// What it moves by \[m\].
     pub linear: Vector3<f64>,
     /// What it turns by \[rad\].
     pub yaw: f64,

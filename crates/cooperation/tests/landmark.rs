@@ -7,9 +7,16 @@ use mikoshi_spatial::{Pose, Twist, World, log};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-const PARAMETERS: LandmarkParameters =
-    LandmarkParameters { period_s: 0.005, time_constant_s: 4.0, limit_m_s: 0.01, limit_rad_s: 0.02 };
+const PARAMETERS: LandmarkParameters = LandmarkParameters {
+    period_s: 0.005,
+    time_constant_s: 4.0,
+    height_time_constant_s: 1.0,
+    height_tolerance_m: 0.002,
+    limit_m_s: 0.01,
+    limit_rad_s: 0.02,
+};
 const TICKS_OF_TIME_CONSTANT: usize = 800;
+const TICKS_OF_HEIGHT_TIME_CONSTANT: usize = 200;
 
 fn landmark() -> Landmark {
     Landmark::new(&PARAMETERS).expect("a landmark")
@@ -90,16 +97,32 @@ proptest! {
     }
 
     #[test]
-    fn what_is_apart_on_the_ground_comes_together_and_heights_stay(mut team in teams()) {
-        let heights: Vec<_> = team.tips.iter().map(|tip| tip.translation.z).collect();
+    fn what_is_apart_comes_together_and_heights_as_far_as_no_plane_explains_them(mut team in teams()) {
         // As fast as limits allow, then by the time constant.
         for _ in 0..25 * TICKS_OF_TIME_CONSTANT {
             team.correct(&landmark());
         }
         let (distance, angle) = team.apart();
         prop_assert!(distance < 1e-8 && angle < 1e-8, "{distance} m, {angle} rad are left");
+        let (mean, _) = team.mean();
+        for tip in &team.tips {
+            let height = tip.translation.z - mean.z;
+            prop_assert!(height.abs() < PARAMETERS.height_tolerance_m + 1e-6, "{height} m are left");
+        }
+    }
+
+    #[test]
+    fn heights_of_robots_on_one_plane_stay_to_the_last_bit(mut team in teams(), share in 0.0..0.99_f64) {
+        // All within the tolerance of their mean, whatever the weights.
+        for tip in &mut team.tips {
+            tip.translation.z = 0.7 + tip.translation.z.sin() * share * PARAMETERS.height_tolerance_m / 2.0;
+        }
+        let heights: Vec<_> = team.tips.iter().map(|tip| tip.translation.z).collect();
+        for _ in 0..100 {
+            team.correct(&landmark());
+        }
         for (tip, height) in team.tips.iter().zip(heights) {
-            prop_assert!((tip.translation.z - height).abs() < 1e-12);
+            prop_assert_eq!(tip.translation.z.to_bits(), height.to_bits());
         }
     }
 
@@ -107,7 +130,8 @@ proptest! {
     fn no_frame_moves_faster_than_it_may(team in teams()) {
         let sightings = team.sightings();
         for correction in landmark().corrections(&sightings) {
-            prop_assert!(correction.linear.norm() <= 0.01 * 0.005 * (1.0 + 1e-9));
+            prop_assert!(correction.linear.xy().norm() <= 0.01 * 0.005 * (1.0 + 1e-9));
+            prop_assert!(correction.linear.z.abs() <= 0.01 * 0.005 * (1.0 + 1e-9));
             prop_assert!(correction.yaw.abs() <= 0.02 * 0.005 * (1.0 + 1e-9));
         }
     }
@@ -122,6 +146,18 @@ fn an_offset_shrinks_by_the_time_constant() {
     }
     let (distance, _) = team.apart();
     assert!((distance / 0.004 * core::f64::consts::E - 1.0).abs() < 1e-3, "{distance}");
+}
+
+/// Of two robots as many as one another, each is half of what parts them off the mean: beyond the tolerance that shrinks.
+#[test]
+fn a_height_that_is_off_shrinks_by_its_time_constant_to_the_tolerance() {
+    let at = |z: f64| Pose::new(Vector3::new(0.0, 0.0, z), nalgebra::UnitQuaternion::identity());
+    let mut team = Team { tips: vec![at(0.006), at(-0.006)], weights: vec![0.5, 0.5] };
+    for _ in 0..TICKS_OF_HEIGHT_TIME_CONSTANT {
+        team.correct(&landmark());
+    }
+    let beyond = team.tips[0].translation.z - PARAMETERS.height_tolerance_m;
+    assert!((beyond / 0.004 * core::f64::consts::E - 1.0).abs() < 3e-3, "{beyond}");
 }
 
 /// Limits shorten all corrections alike: one robot that is far off moves nobody else's share of the mean.
@@ -159,10 +195,13 @@ fn parameters_that_make_no_sense_are_refused() {
         (|p| p.time_constant_s = 0.005) as fn(&mut LandmarkParameters),
         |p| p.time_constant_s = f64::NAN,
         |p| p.time_constant_s = f64::INFINITY,
+        |p| p.height_time_constant_s = 0.005,
         |p| p.period_s = 0.0,
     ] {
         assert_eq!(with(change), Err(BuildLandmarkError::TimeConstant));
     }
+    assert_eq!(with(|p| p.height_tolerance_m = -0.001), Err(BuildLandmarkError::HeightTolerance));
+    assert_eq!(with(|p| p.height_tolerance_m = f64::NAN), Err(BuildLandmarkError::HeightTolerance));
     assert_eq!(with(|p| p.limit_m_s = 0.0), Err(BuildLandmarkError::Limit));
     assert_eq!(with(|p| p.limit_rad_s = f64::NAN), Err(BuildLandmarkError::Limit));
 }

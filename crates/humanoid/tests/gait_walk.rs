@@ -325,6 +325,7 @@ fn a_load_in_the_hands_moves_the_centre_of_mass_and_not_the_zmp() {
             sole_heights: None,
             load,
             divergent_component: None,
+            soles_turn: PerFoot { right: false, left: false },
         };
         robot.gait.act(&mut robot.state, &inputs);
     }
@@ -349,6 +350,7 @@ fn a_tick_allocates_nothing_and_a_copy_of_the_state_goes_on_alike() {
             sole_heights: None,
             load: ExternalLoad::NONE,
             divergent_component: None,
+            soles_turn: PerFoot { right: false, left: false },
         };
         let mut twin = copy;
         let (reference, _) = assert_no_alloc(|| {

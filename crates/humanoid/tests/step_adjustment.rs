@@ -115,6 +115,7 @@ fn pushed(velocity_m_s: f64, adjusts_steps: bool) -> f64 {
             sole_heights: None,
             load: ExternalLoad::NONE,
             divergent_component: Some(dcm),
+            soles_turn: PerFoot { right: false, left: false },
         };
         robot.gait.act(&mut robot.state, &inputs);
         // What the sole under the planned zero moment point bears at most.

@@ -6,6 +6,9 @@
 //! hands, where the object is, stays too. What changes is the way from then on: which way the robot is told to
 //! go, and how far from its hands the object turns.
 //!
+//! On ground that is not flat a robot that lands has its height from a foot that comes to rest while it bears: heights
+//! part as well, by a millimetre with a step.
+//!
 //! Odometry errs by steps, so frames move while the team steps, and rest while it stands. Where an internal row
 //! is under position control, hands are asked to part, and nothing tells that from odometry: frames rest.
 
@@ -23,6 +26,10 @@ use nalgebra::Vector3;
 /// they were sent: this leaves them 1 mm off, or 4. Their sway of some millimetres comes and goes with every second
 /// step of .8 s, and is averaged.
 const TIME_CONSTANT_S: f64 = 4.0;
+/// On boards robots part by 1 mm/s in height, step for step. They hardly sway up and down.
+const HEIGHT_TIME_CONSTANT_S: f64 = 1.0;
+/// Heights that differ by less are how legs and grasps yield: on flat ground no frame is raised.
+const HEIGHT_TOLERANCE_M: f64 = 0.002;
 /// Several times what a robot that walks fast drifts.
 const LIMIT_M_S: f64 = 0.01;
 const LIMIT_RAD_S: f64 = 0.02;
@@ -41,12 +48,13 @@ pub(crate) struct OdometryState {
     frames: [LevelFrame; MAX_ROBOTS],
 }
 
-/// A frame on level ground: what is stored can't tilt.
+/// A level frame: what is stored can't tilt.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LevelFrame {
     x_m: f64,
     y_m: f64,
+    z_m: f64,
     yaw_rad: f64,
 }
 
@@ -79,14 +87,14 @@ impl OdometryState {
 
 impl LevelFrame {
     fn pose(&self) -> Option<Pose<World, Odometry>> {
-        let Self { x_m, y_m, yaw_rad } = *self;
-        let is_valid = [x_m, y_m, yaw_rad].iter().all(|value| value.is_finite());
-        is_valid.then(|| Pose::new(Vector3::new(x_m, y_m, 0.0), exp(&Vector3::new(0.0, 0.0, yaw_rad))))
+        let Self { x_m, y_m, z_m, yaw_rad } = *self;
+        let is_valid = [x_m, y_m, z_m, yaw_rad].iter().all(|value| value.is_finite());
+        is_valid.then(|| Pose::new(Vector3::new(x_m, y_m, z_m), exp(&Vector3::new(0.0, 0.0, yaw_rad))))
     }
 
     fn moved(&self, motion: &Pose<World, World>, yaw_rad: f64) -> Self {
-        let moved = motion.transform_point(&Vector3::new(self.x_m, self.y_m, 0.0));
-        Self { x_m: moved.x, y_m: moved.y, yaw_rad: self.yaw_rad + yaw_rad }
+        let moved = motion.transform_point(&Vector3::new(self.x_m, self.y_m, self.z_m));
+        Self { x_m: moved.x, y_m: moved.y, z_m: moved.z, yaw_rad: self.yaw_rad + yaw_rad }
     }
 }
 
@@ -98,6 +106,8 @@ impl OdometryFrames {
         let landmark = Landmark::new(&LandmarkParameters {
             period_s: scenario.control_period_s,
             time_constant_s: TIME_CONSTANT_S,
+            height_time_constant_s: HEIGHT_TIME_CONSTANT_S,
+            height_tolerance_m: HEIGHT_TOLERANCE_M,
             limit_m_s: LIMIT_M_S,
             limit_rad_s: LIMIT_RAD_S,
         })?;

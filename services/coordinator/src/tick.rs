@@ -64,7 +64,7 @@ pub struct Coordinator {
 
 /// Of [`CoordinatorState`]'s layout: another one gets another number, so that no coordinator goes on from a
 /// state that it would misread.
-pub(crate) const STATE_VERSION: u64 = 8;
+pub(crate) const STATE_VERSION: u64 = 9;
 
 /// All that matters between ticks.
 #[repr(C)]

@@ -177,6 +177,27 @@ fn a_correction_moves_nobodys_hand() {
 }
 
 #[test]
+fn worlds_whose_heights_have_parted_are_brought_together_before_a_hand_seems_to_slip() {
+    let mut team = Team::started(&[]);
+    let object = team.out.team_state.object_pose;
+    // By .8 mm with each step of .8 s, further than any grip may seem to part.
+    let (step_ticks, step_m, steps) = (160, 0.0008, 25);
+    let mut slip = 0.0_f64;
+    for _ in 0..steps {
+        for (robot, sign) in [(1, 1.0), (2, -1.0)] {
+            team.X_OW[robot].translation.z += sign * step_m;
+        }
+        team.go_on_until(team.tick + step_ticks);
+        slip = team.out.team_state.hand_slip.iter().copied().fold(slip, f64::max);
+    }
+    assert_eq!(team.out.team_state.stop_cause, 0, "with a slip of {slip}");
+    assert!(slip < 0.5, "{slip}");
+    let (distance, _) = team.apart();
+    assert!(distance < 0.006, "{distance} m of {} m are left", 2.0 * step_m * f64::from(steps));
+    assert!((team.out.team_state.object_pose[2] - object[2]).abs() < 1e-5);
+}
+
+#[test]
 fn what_a_robot_is_told_of_the_way_is_in_its_own_world() {
     let mut team = Team::started(&[]).with_drift();
     team.go_on_until(SETTLED);

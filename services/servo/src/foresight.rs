@@ -54,6 +54,7 @@ impl Legs {
                 sole_heights: None,
                 load: ahead.gait.load,
                 divergent_component: None,
+                soles_turn: PerFoot { right: false, left: false },
             };
             self.gait.act(&mut ahead.gait, &inputs);
         } else {

@@ -257,6 +257,10 @@ impl Legs {
                 load,
                 divergent_component: felt
                     .map(|felt| self.pendulum.divergent_component(&felt.com, &felt.com_velocity)),
+                soles_turn: PerFoot::from_fn(|side| {
+                    let turns = |stabiliser: &Stabiliser| stabiliser.turns(&state.stabiliser, side);
+                    self.stabiliser.as_ref().is_some_and(turns)
+                }),
             },
         );
         state.steps += u64::from(is_swinging(&state.gait) && !was_swinging);

@@ -213,6 +213,16 @@ impl Stabiliser {
         &self.config
     }
 
+    /// Whether a sole stands on the edge of something and turns to find its ground.
+    pub fn turns(&self, state: &StabiliserState, side: Side) -> bool {
+        state.sole_turning[side].amax() > self.patience_nm_s()
+    }
+
+    /// What a sole that turns has felt past what is usual \[Nm s\].
+    fn patience_nm_s(&self) -> f64 {
+        self.config.edge_patience_m_s * self.config.pendulum.weight_n()
+    }
+
     /// One tick.
     ///
     /// 1. Divergent component: ξ = c + ċ / ω, error e = ξ − ξ_ref; extended zero moment point
@@ -275,7 +285,7 @@ impl Stabiliser {
                     Vector2::zeros()
                 };
                 let usual = config.edge_m * pendulum.weight_n();
-                let patience = config.edge_patience_m_s * pendulum.weight_n();
+                let patience = self.patience_nm_s();
                 let most = patience + config.edge_max_rad_s / config.edge_rad_s2_nm.max(1e-9);
                 *turning = turning.zip_map(&off, |turning, off| {
                     let beyond = off - off.clamp(-usual, usual);

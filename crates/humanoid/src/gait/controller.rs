@@ -5,6 +5,7 @@ use super::foot_placement::{FootError, FootPlacement, HandCentre};
 use super::ground_pose::{GroundPose, wrap};
 use super::machine::{GaitPhase, SwingingFoot, TransitionInputs};
 use super::preview::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError};
+use super::settling::Settling;
 use super::step_adjustment::{StepAdjustment, StepInHand};
 use super::step_clock::{StepClock, StepTiming};
 use super::step_planner::StepLimits;
@@ -49,6 +50,8 @@ pub struct GaitConfig {
     pub load_filter_s: f64,
     /// Whether steps change while they are made, for a robot that was pushed.
     pub adjusts_steps: bool,
+    /// How long both feet stay on the ground for a sole that turns to it \[s\].
+    pub settling_s: f64,
 }
 
 impl GaitConfig {
@@ -72,6 +75,7 @@ impl GaitConfig {
             reference_lead_s: 0.4,
             load_filter_s: 1.0,
             adjusts_steps: true,
+            settling_s: 0.4,
         }
     }
 }
@@ -97,6 +101,8 @@ pub struct GaitState {
     pub zmp_ref: Vector2<f64>,
     /// What only a step can do about it.
     pub trouble: Trouble,
+    /// Whether the foot that is to bear next has found its ground.
+    pub settling: Settling,
 }
 
 /// How a robot is off balance beyond what its soles can do about it.
@@ -127,6 +133,8 @@ pub struct GaitInputs {
     pub load: ExternalLoad,
     /// The divergent component as measured \[m, world\]; as planned when absent.
     pub divergent_component: Option<Vector2<f64>>,
+    /// Whether each sole stands on the edge of something and turns to find its ground.
+    pub soles_turn: PerFoot<bool>,
 }
 
 /// Reference of one foot at the end of the tick.
@@ -191,6 +199,7 @@ impl Gait {
             clock: StepClock::Standing,
             zmp_ref: com,
             trouble: Trouble::default(),
+            settling: Settling::default(),
         }
     }
 
@@ -202,7 +211,8 @@ impl Gait {
         let is_in_trouble = state.trouble.excess != Vector2::zeros();
         let waits = is_in_trouble && !state.trouble.falls && state.clock != StepClock::Standing;
         let ready = state.phase.is_ready(&state.clock)
-            && !(state.phase.planned_step().is_some() && (waits || state.trouble.bears));
+            && !(state.phase.planned_step().is_some() && (waits || state.trouble.bears))
+            && !state.settling.waits(self.ticks(self.config.settling_s));
         let land_in_ticks = state.phase.swinging_foot().map_or(0, |foot| foot.swing.change.land_in_ticks);
         let content = StepWish { ready, land_in_ticks, ..StepWish::CONTENT };
         let (Some(placement), Some(centre)) = (&state.placement, hand_centre) else { return content };
@@ -293,6 +303,7 @@ impl Gait {
             let pose = inputs.soles.map_or(foothold.pose, |soles| soles[side]);
             state.feet[side] = Foothold { pose, ..foothold };
         }
+        state.settling = state.settling.after(&state.phase, &inputs.soles_turn);
         self.plan_step(state, inputs);
         state.stance = stance(&state.phase).unwrap_or(state.stance);
 
@@ -347,6 +358,10 @@ impl Gait {
 
     fn seconds(&self, ticks: u64) -> f64 {
         ticks as f64 * self.config.preview.control_period_s
+    }
+
+    fn ticks(&self, seconds: f64) -> u64 {
+        (seconds / self.config.preview.control_period_s).round() as u64
     }
 
     /// Share of the swing at the end of the clock's tick; more than one when the swing is over.

@@ -114,6 +114,7 @@ impl Robot {
             sole_heights: None,
             load,
             divergent_component: None,
+            soles_turn: PerFoot { right: false, left: false },
         };
         self.gait.act(&mut self.state, &inputs)
     }
