@@ -103,7 +103,7 @@ impl Landmark {
         if !(period_s > 0.0 && is_longer(time_constant_s) && is_longer(height_time_constant_s)) {
             return Err(BuildLandmarkError::TimeConstant);
         }
-        if !(height_tolerance_m >= 0.0) {
+        if height_tolerance_m.is_nan() || height_tolerance_m < 0.0 {
             return Err(BuildLandmarkError::HeightTolerance);
         }
         if !(limit_m_s > 0.0 && limit_rad_s > 0.0) {
