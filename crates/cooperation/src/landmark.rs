@@ -3,9 +3,10 @@
 //!
 //! A robot knows where it is in Σo by the feet it stands on, and errs a little with every step: its own Σo,
 //! frame O, drifts in the true one. Gravity keeps its axis, and flat ground its height; what drifts are x, y and
-//! yaw, and on ground that is not flat the height. Nothing that a team feels tells how far all have drifted together, but its hands tell how far they have
-//! drifted apart, for the object is rigid. With a_i the displacement from the team's mean object (eq. 27) to
-//! where the tip of arm i has it, less what its grasp yields, robot r's hands see the object displaced by
+//! yaw, and on ground that is not flat the height. Nothing that a team feels tells how far all have drifted
+//! together, but its hands tell how far they have drifted apart, for the object is rigid. With a_i the displacement
+//! from the team's mean object (eq. 27) to where the tip of arm i has it, less what its grasp yields, robot r's
+//! hands see the object displaced by
 //!
 //! ```text
 //! a_r = mean of a_i over its arms,   ε_r = a_r − Σ w_s a_s

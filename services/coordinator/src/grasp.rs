@@ -39,8 +39,9 @@ impl GraspCompliance {
     }
 
     /// How far the object is from the mean of the sticks' tips (eq. 27), by the hands' filtered wrenches,
-    /// which go one tick on. With each hand comes the lever from it to its tip, in the world. `shares` are the tips' weights in that mean, and in what they bear of the
-    /// external wrench (W⁻); hands without a share take no part.
+    /// which go one tick on. With each hand comes the lever from it to its tip, in the world. `shares` are
+    /// the tips' weights in that mean, and in what they bear of the external wrench (W⁻); hands without a
+    /// share take no part.
     ///
     /// Unless the object `is_free`, only the internal part of the wrenches counts. An object that something
     /// holds, a wall that it is pressed against or what it rests on, would else seem not to follow its hands
