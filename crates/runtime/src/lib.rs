@@ -29,6 +29,7 @@ mod runner;
 mod schedule;
 mod shared_memory;
 mod snapshot;
+mod suspicion;
 mod topic;
 pub mod transport;
 mod wait;

@@ -5,6 +5,7 @@ use crate::board::{Board, BoardError, Role, Slot, State};
 use crate::pace::{Pace, now_ns, sleep_until, trimmed_origin_ns, yield_until};
 use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::pulse;
+use crate::suspicion::{LEAST_LOOK_NS, Suspicion};
 use crate::wait::{Bed, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
 use core::cell::{Cell, RefCell};
@@ -40,13 +41,6 @@ pub enum JoinError {
     #[error("/proc: {0}")]
     Proc(#[from] io::Error),
 }
-
-/// How long a service must be behind the world before its standby takes its place, in ticks and in time: a
-/// machine that stalls for a moment stalls the standby, too.
-const PATIENCE_TICKS: u64 = 2;
-const PATIENCE_NS: u64 = 10_000_000;
-/// How often a standby looks, at most.
-const LEAST_LOOK_NS: u64 = 2_000_000;
 
 /// A process of a run. When it is dropped before [`Member::conclude`], all others learn that it failed.
 pub struct Member {
@@ -192,17 +186,12 @@ impl Member {
 
     fn stand_by(&self, pace: Option<&Pace>) -> Result<Option<ProcessIdentity>, TickError> {
         let slot = self.slot();
-        let period_ns = pace.map_or(LEAST_LOOK_NS, |pace| pace.period_ns);
-        let lag_ticks = pace.map_or(0, Pace::lag_ticks);
-        let patience_ticks = PATIENCE_NS.div_ceil(period_ns).max(PATIENCE_TICKS) + lag_ticks;
+        let mut suspicion = pace.map(|pace| Suspicion::new(pace.period_ns, pace.lag_ticks()));
         let world = self.slot_of(Role::Service(ServiceId::Bridge));
-        let is_behind = || {
-            let world = world.map_or(Position::default(), Slot::position);
-            world.tick >= slot.position().tick.saturating_add(patience_ticks)
-        };
         slot.set_standby(ProcessIdentity::own().map_err(|_| TickError::Aborted)?);
         loop {
-            let look_ns = now_ns().saturating_add((period_ns / 2).max(LEAST_LOOK_NS));
+            let look_in_ns = suspicion.as_ref().map_or(LEAST_LOOK_NS, Suspicion::next_look_ns);
+            let look_ns = now_ns().saturating_add(look_in_ns);
             // Whoever makes room does so for another, who is ready; unless that is lost, too.
             let is_vacant =
                 || !slot.is_reserved() && (slot.process().is_none() || self.has_exited(self.slot));
@@ -215,7 +204,9 @@ impl Member {
                 return Ok(None);
             }
             let is_to_work = matches!(slot.state(), State::Running | State::Retired) && !slot.is_reserved();
-            if pace.is_some() && is_to_work && is_behind() {
+            let at = slot.position();
+            let world_at = if is_to_work { world.map_or(at, Slot::position) } else { at };
+            if suspicion.as_mut().is_some_and(|suspicion| suspicion.is_confirmed(at, world_at)) {
                 return Ok(slot.process());
             }
         }

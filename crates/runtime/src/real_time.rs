@@ -72,8 +72,9 @@ impl RealTime {
     pub fn apply(&self) -> Result<Vec<MissingRight>, MissingRight> {
         let requests = [
             self.core.map(pin_to),
-            self.fifo_priority.map(use_fifo_priority),
             self.lock_memory.then(lock_memory),
+            // Last: nobody on this core is to wait for what takes long.
+            self.fifo_priority.map(use_fifo_priority),
         ];
         let missing = requests.into_iter().flatten().filter_map(Result::err);
         match self.on_missing_right {

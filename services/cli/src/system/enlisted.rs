@@ -114,10 +114,9 @@ fn placement_text(scenario: &Scenario, service: ServiceId) -> String {
         let _ = writeln!(text, "CPUAffinity={core}");
     }
     if let Some(priority) = scenario.placement.fifo_priority {
-        let _ = writeln!(
-            text,
-            "CPUSchedulingPolicy=fifo\nCPUSchedulingPriority={priority}\nLimitRTPRIO={priority}"
-        );
+        // The right to it only: with `CPUSchedulingPolicy=` systemd would set up its sandbox at this priority, and
+        // the ticks of others on that core wait for it. The process takes it once it is set up.
+        let _ = writeln!(text, "LimitRTPRIO={priority}");
     }
     if text.is_empty() { text } else { format!("# From {SCENARIO}, section [placement].\n[Service]\n{text}") }
 }
@@ -187,7 +186,7 @@ mod tests {
         assert!(
             placed[1]
                 .placement
-                .ends_with("[Service]\nCPUSchedulingPolicy=fifo\nCPUSchedulingPriority=20\nLimitRTPRIO=20\n")
+                .ends_with("[Service]\nLimitRTPRIO=20\n")
         );
         assert!(placed[4].placement.contains("\nCPUAffinity=3\n"), "{}", placed[4].placement);
     }
