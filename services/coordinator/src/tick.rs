@@ -406,7 +406,7 @@ impl Coordinator {
         out.team_state.drive_silent_ticks = self.operator.silent_ticks(&state.operator, tick);
         out.team_state.awaited_word = self.job.awaited(&phase);
         if is_hybrid && !is_led {
-            Tip::fill(&mut team.tips, &state.hybrid, hands, &law_output.position.external);
+            Tip::fill(&mut team.tips, &state.hybrid, &team.law, &law_output.position.external);
             if !state.clock.is_standing() {
                 self.correct_odometry(state, team);
             }
@@ -864,7 +864,7 @@ fn write_team_state(
     let object_pose_ref = reference.map_or(*measured, |(_, position)| position.external);
     // In place: it is large.
     let team_state = &mut out.team_state;
-    *team_state = TeamState::zeroed();
+    bytemuck::write_zeroes(team_state);
     team_state.object_pose = measured.to_array();
     team_state.object_pose_ref = object_pose_ref.to_array();
     team_state.object_twist_ref = state.motion.twist;

@@ -3,7 +3,8 @@
 use crate::workspace::nan_pose;
 use crate::{Formation, InternalForces, VirtualStick, WorkspaceScratch};
 use bytemuck::{Pod, Zeroable};
-use mikoshi_spatial::{Hand, Pose, World};
+use mikoshi_spatial::{Hand, Pose, Tip, World};
+use nalgebra::Vector3;
 
 /// All that matters between ticks, for up to `CAPACITY` arms: a plain value that can be copied bit by bit.
 /// Entries past the number of arms are zero.
@@ -88,6 +89,12 @@ impl HybridScratch {
             sticks: vec![VirtualStick { X_HB: Pose::identity() }; n],
             hand_pose_ref: vec![Pose::identity(); n],
         }
+    }
+
+    /// Where each hand's stick ends, and the vector from the hand to there, in the world \[m\]: as the law has found them
+    /// in this tick, whoever takes part.
+    pub fn tips(&self) -> impl Iterator<Item = (&Pose<World, Tip>, &Vector3<f64>)> {
+        self.workspace.tips.iter().zip(&self.workspace.levers)
     }
 
     /// Overwrites every number with NaN.
