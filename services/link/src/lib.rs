@@ -13,6 +13,7 @@
 pub mod carry;
 pub mod certify;
 pub mod checkpoint;
+pub mod expiry;
 pub mod gate;
 pub mod keys;
 pub mod latency;

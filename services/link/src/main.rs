@@ -7,10 +7,11 @@ use core::time::Duration;
 use mikoshi_ipc_types::ServiceId;
 use mikoshi_link::carry::Carrier;
 use mikoshi_link::certify::{CertifyArguments, certify};
+use mikoshi_link::expiry::Expiry;
 use mikoshi_link::keys::Keys;
 use mikoshi_link::measure::{MeasureArguments, measure};
 use mikoshi_link::peers::Peers;
-use mikoshi_link::report::Reporter;
+use mikoshi_link::report::{Reporter, Told};
 use mikoshi_link::session::{self, Certificates, Parts};
 use mikoshi_link::task::Task;
 use mikoshi_process::journal::{About, Severity, say};
@@ -78,6 +79,7 @@ fn carry(arguments: &CarryArguments) -> Result<(), ServeError> {
         ServeError::configuration(format!("there is no host `{name}` in this run; expected one of {known}"))
     })?;
     let certificates = Certificates::of(&arguments.certificates, &name).map_err(ServeError::configuration)?;
+    let expiry = Expiry::of(&certificates).map_err(ServeError::configuration)?;
     let hash = *blake3::hash(&run.encode()).as_bytes();
     let peers = Arc::new(Peers::new(&run, hash, host, incarnation()));
     let keys = Keys::of(&run);
@@ -88,8 +90,8 @@ fn carry(arguments: &CarryArguments) -> Result<(), ServeError> {
     let session = session::open(&parts, &certificates).map_err(ServeError::fault)?;
     let opened = Carrier::open(task, policy_of(&run), &session, &keys, Arc::clone(&peers));
     let mut carrier = opened.map_err(ServeError::fault)?;
-    let counted = (carrier.sources(), carrier.kept());
-    let reporter = Reporter::start(&arguments.run, &run, host, &session, &keys, peers, counted);
+    let told = Told { peers, sources: carrier.sources(), kept: carrier.kept(), expiry };
+    let reporter = Reporter::start(&arguments.run, &run, host, &session, &keys, told);
     let reporter = reporter.map_err(ServeError::fault)?;
     notify::tell_ready("set up");
     let board = Board::open(&arguments.run).map_err(ServeError::fault)?;

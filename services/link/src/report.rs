@@ -1,5 +1,6 @@
 //! Says hello to the others, and writes down what is counted, beside the frames.
 
+use crate::expiry::Expiry;
 use crate::keys::Keys;
 use crate::latency::{Quantiles, fitting_delay_ticks};
 use crate::peers::{PeerReport, Peers};
@@ -9,6 +10,7 @@ use crate::traffic::Source;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use mikoshi_config::RunSpec;
+use mikoshi_process::journal::{About, Severity, say};
 use mikoshi_runtime::Board;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -16,6 +18,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
+use time::OffsetDateTime;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::Locality;
 use zenoh::{Session, Wait as _};
@@ -23,9 +26,23 @@ use zenoh::{Session, Wait as _};
 /// How often others hear of us.
 const HELLO: Duration = Duration::from_millis(50);
 /// How many hellos lie between two reports.
-const HELLOS_A_REPORT: u32 = 20;
+const HELLOS_A_REPORT: u64 = 20;
+/// And between two looks at when certificates end: a day.
+const HELLOS_A_DAY: u64 = 86_400_000 / HELLO.as_millis() as u64;
 /// The report, in the run's directory.
 const REPORT: &str = "link.json";
+
+/// What there is to tell, beside frames.
+pub struct Told<'a> {
+    /// Who the others are, and who this host is.
+    pub peers: Arc<Peers>,
+    /// Where frames come from.
+    pub sources: &'a [Arc<Source>],
+    /// What is kept here for successors of others' services.
+    pub kept: Vec<Arc<Kept>>,
+    /// When certificates end.
+    pub expiry: Expiry,
+}
 
 /// A thread beside the carrier.
 pub struct Reporter {
@@ -43,6 +60,7 @@ struct Reported {
     kept: Vec<Arc<Kept>>,
     path: PathBuf,
     session: Session,
+    expiry: Expiry,
 }
 
 #[derive(Serialize)]
@@ -50,6 +68,8 @@ struct Report<'a> {
     host: &'a str,
     incarnation: u64,
     tick: Option<u64>,
+    /// The day on which this host's certificate ends, or its authority's if that is sooner.
+    certificate_ends: String,
     hosts: Vec<PeerReport<'a>>,
     /// What hosts have put under keys that are not theirs.
     refused_by_access_control: Option<u64>,
@@ -114,6 +134,7 @@ impl Reported {
             host: &self.host,
             incarnation: self.peers.incarnation(),
             tick: self.peers.tick(),
+            certificate_ends: self.expiry.day(),
             hosts: self.peers.report(),
             refused_by_access_control: refused_by_access_control(&self.session),
             topics,
@@ -158,8 +179,7 @@ impl Reporter {
         host: usize,
         session: &Session,
         keys: &Keys,
-        peers: Arc<Peers>,
-        (sources, kept): (&[Arc<Source>], Vec<Arc<Kept>>),
+        told: Told<'_>,
     ) -> Result<Self, SessionError> {
         let names: Vec<_> = run.scenario.hosts.iter().map(|host| host.name.clone()).collect();
         let key = keys.hello(&names[host]);
@@ -176,19 +196,25 @@ impl Reporter {
             host: names[host].clone(),
             names,
             period_s: run.scenario.wall_period_s(),
-            peers,
-            sources: sources.to_vec(),
-            kept,
+            peers: told.peers,
+            sources: told.sources.to_vec(),
+            kept: told.kept,
+            expiry: told.expiry,
             path: directory.join(REPORT),
             session: session.clone(),
         });
         let is_over = Arc::new(AtomicBool::new(false));
         let (reported, over) = (Arc::clone(&state), Arc::clone(&is_over));
         let thread = thread::spawn(move || {
-            for number in 0_u32.. {
+            for number in 0_u64.. {
                 let _ = publisher.put(reported.peers.hello(&board)).wait();
                 if number % HELLOS_A_REPORT == 0 {
                     reported.write();
+                }
+                if number % HELLOS_A_DAY == 0
+                    && let Some(warning) = reported.expiry.warning(OffsetDateTime::now_utc())
+                {
+                    say(Severity::Warning, About::default(), warning);
                 }
                 if over.load(Ordering::Acquire) {
                     break;

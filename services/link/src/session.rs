@@ -54,8 +54,8 @@ impl Carrier {
 
 /// The files by which a host shows who it is, and knows who others are.
 pub struct Certificates {
-    authority: PathBuf,
-    certificate: PathBuf,
+    pub(crate) authority: PathBuf,
+    pub(crate) certificate: PathBuf,
     key: PathBuf,
 }
 

@@ -37,6 +37,7 @@ fn a_certificate_that_ends_during_a_walk_stops_the_team_and_with_a_new_one_it_go
     plan.certify(&["--host", &b, "--days", &(GOOD_FOR_S / 86_400.0).to_string()]);
     team.start();
     team.wait_for_tick(600);
+    assert!(team.words().contains(&format!("{b}.pem ends within a day")), "{}", team.words());
     let is_silent = || silence_s(&team, HEAD, &b) > SILENT_S;
     team.wait_until(2000, is_silent);
     let ended = team.tick(STAGE);
