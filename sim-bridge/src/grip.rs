@@ -1,18 +1,12 @@
-//! Which hands hold the object: a hand closes where its palm is near its place, and opens when it is told to. It is pulled to
-//! its place where the object rests. Of an object that hangs in other robots' hands it takes hold where it is, near where it
-//! held before.
+//! Closing and opening hands, and where they have taken hold.
 
 use crate::layout::{HandLayout, Layout};
 use crate::pose::{body_pose, site_pose};
 use mikoshi_ipc_types::{JointCommand, MAX_HANDS, PoseWire};
+use mikoshi_physics::{Grip, is_in_reach};
 use mikoshi_spatial::{Hand, Object, Pose};
 use mujoco_rs::prelude::{MjData, MjModel, MjtSameFrame};
 use nalgebra::UnitQuaternion;
-
-/// How near its place on the object a palm must be for its hand to close on it.
-const REACH_M: f64 = 0.02;
-/// The same about an axis.
-const REACH_RAD: f64 = 0.1;
 
 /// Where on the object each hand of a robot has taken hold; zeros where it is pulled to its place.
 pub type Taken = [PoseWire; MAX_HANDS];
@@ -26,37 +20,29 @@ pub fn close_and_open(
     (holding, taken): (&mut [u64], &mut [Taken]),
     has_failed: impl Fn(usize, usize) -> bool,
 ) {
-    let held = holding.iter().enumerate();
-    let holders = held.fold(0_u64, |set, (robot, holding)| set | u64::from(*holding != 0) << robot);
-    let robots = layout.robots.iter().zip(commands).zip(holding.iter_mut().zip(taken));
-    for (index_of_robot, ((robot, command), (holding, taken))) in robots.enumerate() {
-        let others_hold = holders & !(1 << index_of_robot) != 0;
-        for (index, (hand, taken)) in robot.hands.iter().zip(taken).enumerate() {
-            let bit = 1 << index;
-            let (holds, shall_hold) = (*holding & bit != 0, command.closed_hands & bit != 0);
-            if holds == shall_hold {
-                continue;
-            }
-            if shall_hold {
-                let palm = in_object(data, layout, hand.palm_site);
-                let place = match others_hold {
-                    true => in_object(data, layout, hand.object_site),
-                    false => hand.place_on_object,
-                };
-                if !is_in_reach(&place, &palm) {
-                    continue;
-                }
-                if others_hold && !has_failed(index_of_robot, index) {
-                    *taken = palm.to_array();
-                    move_site(data, hand, taken);
-                }
-            }
-            *holding ^= bit;
-            if let Some(equality) = hand.equality {
-                data.eq_active_mut()[equality] = shall_hold;
-            }
+    mikoshi_physics::close_and_open(holding, commands, |robot, index, grip| {
+        let Some(hand) = layout.robots[robot].hands.get(index) else { return false };
+        let palm = || in_object(data, layout, hand.palm_site);
+        let place = match grip {
+            Grip::Open => None,
+            Grip::Close => Some((hand.place_on_object, palm())),
+            Grip::CloseBesideOthers => Some((in_object(data, layout, hand.object_site), palm())),
+        };
+        if place.is_some_and(|(place, palm)| !is_in_reach(&place, &palm)) {
+            return false;
         }
-    }
+        if let (Grip::CloseBesideOthers, Some((_, palm))) = (grip, place)
+            && !has_failed(robot, index)
+        {
+            let taken = &mut taken[robot][index];
+            *taken = palm.to_array();
+            move_site(data, hand, taken);
+        }
+        if let Some(equality) = hand.equality {
+            data.eq_active_mut()[equality] = grip != Grip::Open;
+        }
+        true
+    });
 }
 
 /// Has all hands hold where they have taken hold, in a model that may not know of it.
@@ -86,9 +72,4 @@ fn in_object(data: &MjData<Box<MjModel>>, layout: &Layout, site: usize) -> Pose<
     let X_WO = body_pose::<Object>(data, &layout.object);
     let X_OS = X_WO.inverse() * site_pose::<Hand>(data, site);
     Pose::new(X_OS.translation, UnitQuaternion::new_normalize(X_OS.rotation.into_inner()))
-}
-
-fn is_in_reach(place: &Pose<Object, Hand>, palm: &Pose<Object, Hand>) -> bool {
-    let gap = place.displacement_to(palm);
-    gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
 }

@@ -15,8 +15,8 @@ use crate::{ENGINE, logging, mjcf, rejects};
 use mikoshi_config::RunSpec;
 use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, Push, RobotTruth, Sensors, all_hands};
 use mikoshi_physics::{
-    ActivePush, BuildWorldError, LoadWorldError, Noise, ObjectBody, Physics, PushScript, SensorCounts,
-    Spring, StepWorldError, are_active, begin, force_n,
+    ActivePush, BuildWorldError, LoadWorldError, Noise, ObjectBody, Physics, PushScript, SETTLING_S,
+    SensorCounts, Spring, StepWorldError, are_active, begin, check_commands, drive_reference, force_n,
 };
 use mikoshi_runtime::{read_parts, write_parts};
 use mikoshi_spatial::{Hand, Wrench};
@@ -98,9 +98,6 @@ impl<'a> Description<'a> {
 pub fn world_xml(run: &RunSpec) -> Result<String, BuildWorldError> {
     Description::of(run).map(|description| description.xml)
 }
-
-/// How long the world comes to rest before tick 0.
-const SETTLING_S: f64 = 1.0;
 
 /// All that the simulator integrates, warm start included: without it a replay differs in the last bits.
 const INTEGRATION: u32 = MjtState::mjSTATE_INTEGRATION as u32;
@@ -251,14 +248,7 @@ impl Physics for World {
     }
 
     fn step(&mut self, commands: &[JointCommand]) -> Result<(), StepWorldError> {
-        if commands.len() != self.robot_count() {
-            return Err(StepWorldError::CommandCount);
-        }
-        let values =
-            commands.iter().flat_map(|c| c.joint_position_ref_rad.iter().chain(&c.joint_velocity_ref_rad_s));
-        if !values.into_iter().all(|value| value.is_finite()) {
-            return Err(StepWorldError::NotFinite);
-        }
+        check_commands(commands, self.robot_count())?;
         let State { tick, holding, taken, pushes, .. } = &mut self.state;
         if self.bodies.turn_to(*tick, &mut self.data) {
             grip::restore(&mut self.data, &self.layout, taken);
@@ -349,8 +339,7 @@ impl World {
         if found == expected { Ok(()) } else { Err(LoadWorldError { found, expected }) }
     }
 
-    /// Lets the world come to rest before tick 0: drives give way under the weight, soles sink in,
-    /// grasps strain. A real team stands before it is asked to do anything.
+    /// Lets the world come to rest before tick 0.
     fn settle(&mut self, step_s: f64) -> Result<(), BuildWorldError> {
         self.data.step1();
         let ticks = (SETTLING_S / (step_s * self.substeps as f64)).ceil() as u64;
@@ -369,12 +358,7 @@ impl World {
         let ctrl = self.data.ctrl_mut();
         for ((layout, from), to) in self.layout.robots.iter().zip(&self.state.commands).zip(commands) {
             for (index, joint) in layout.joints.iter().enumerate() {
-                let (start, end) = (from.joint_position_ref_rad[index], to.joint_position_ref_rad[index]);
-                let feed_forward = match joint.kp > 0.0 {
-                    true => joint.kv / joint.kp * to.joint_velocity_ref_rad_s[index],
-                    false => 0.0,
-                };
-                ctrl[joint.actuator] = start + share * (end - start) + feed_forward;
+                ctrl[joint.actuator] = drive_reference((from, to), index, share, (joint.kp, joint.kv));
             }
         }
     }

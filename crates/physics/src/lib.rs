@@ -7,10 +7,12 @@
 #![allow(non_snake_case)] // Monogram names, as in the crates of mathematics.
 
 mod coast;
+mod drive;
 mod error;
 mod fallback;
 mod grasp;
 mod ground;
+mod hold;
 mod noise;
 mod object_body;
 mod participant;
@@ -20,9 +22,11 @@ mod push;
 mod random;
 mod truth;
 
+pub use drive::{check_commands, drive_reference};
 pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
 pub use grasp::{Spring, grasp_offsets};
 pub use ground::{Slab, slabs};
+pub use hold::{Grip, close_and_open, is_in_reach};
 pub use noise::{Noise, SensorCounts};
 pub use object_body::ObjectBody;
 pub use participant::{BridgeParticipant, BuildBridgeError};
@@ -32,3 +36,7 @@ pub use truth::{Stance, Standing};
 
 /// Standard gravity as simulated worlds have it.
 pub const GRAVITY_M_S2: f64 = 9.81;
+
+/// How long a world comes to rest before tick 0: drives give way under the weight, soles sink in, grasps strain. A real
+/// team stands before it is asked to do anything.
+pub const SETTLING_S: f64 = 1.0;

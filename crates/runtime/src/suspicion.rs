@@ -39,7 +39,6 @@ impl Suspicion {
         let before = core::mem::replace(&mut self.lagged_at, lags.then_some(at));
         lags && before == Some(at)
     }
-
 }
 
 #[cfg(test)]

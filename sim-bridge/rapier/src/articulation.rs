@@ -6,7 +6,7 @@ use mikoshi_humanoid::Kinematics;
 use mikoshi_humanoid::estimate::ForceTorqueSensor;
 use mikoshi_humanoid::model::{FrameId, Geometry, JointKind, Shape};
 use mikoshi_ipc_types::JointCommand;
-use mikoshi_physics::{BuildWorldError, GRAVITY_M_S2};
+use mikoshi_physics::{BuildWorldError, GRAVITY_M_S2, drive_reference};
 use mikoshi_robot::Robot;
 use mikoshi_spatial::{Base, CoordinateFrame, Pose, Sensor, Twist, World, Wrench};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -211,10 +211,7 @@ impl Articulation {
             let Some(multibody) = world.multibody_joints.get_multibody(root.multibody) else { return };
             let (angle, rate) = self.joint(multibody, joint);
             let drive = &mut self.drives[joint];
-            let (start, end) = (from.joint_position_ref_rad[joint], to.joint_position_ref_rad[joint]);
-            let lead =
-                if drive.kp > 0.0 { drive.kv / drive.kp * to.joint_velocity_ref_rad_s[joint] } else { 0.0 };
-            drive.reference = start + share * (end - start) + lead;
+            drive.reference = drive_reference((from, to), joint, share, (drive.kp, drive.kv));
             let demand = drive.kp * (drive.reference - angle) - drive.kv * rate;
             drive.at_limit = (demand.abs() >= drive.effort).then(|| drive.effort.copysign(demand));
             demand_nm(joint, demand.abs(), drive.at_limit.is_some());

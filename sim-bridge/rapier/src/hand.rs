@@ -4,15 +4,10 @@ use crate::articulation::Articulation;
 use crate::convert::{force_and_torque, from_isometry, from_vector, pose, vector};
 use mikoshi_config::Scenario;
 use mikoshi_humanoid::model::FrameId;
-use mikoshi_physics::{BuildWorldError, Spring};
+use mikoshi_physics::{BuildWorldError, Grip, Spring, is_in_reach};
 use mikoshi_spatial::{Hand as HandFrame, Object, Pose, Twist, World, Wrench};
 use nalgebra::Isometry3;
 use rapier3d_f64::prelude::*;
-
-/// How near its place on the object a palm must be for its hand to close on it.
-const REACH_M: f64 = 0.02;
-/// The same about an axis.
-const REACH_RAD: f64 = 0.1;
 
 /// As stiff as a weld of the other engine.
 const WELD_N_M: f64 = 25_000.0;
@@ -78,26 +73,25 @@ impl Hand {
         robot.apply(world, self.palm, &-self.wrench);
     }
 
-    /// It closes on an object that hangs in other robots' hands: where it is.
-    pub fn take_hold(&mut self, world: &PhysicsWorld, robot: &Articulation, object: RigidBodyHandle) {
-        let Some(body) = world.bodies.get(object) else { return };
-        let X_WO = pose::<World, Object>(&from_isometry(body.position()));
-        let X_OH = X_WO.inverse() * robot.frame_pose::<HandFrame>(world, self.palm);
-        self.pulled_to = Isometry3::from_parts(X_OH.translation.into(), X_OH.rotation);
-    }
-
-    /// Whether it could close on the object: at its place, or, where others hold it, near where it held before.
-    pub fn is_in_reach(
-        &self,
+    /// Does it, if it can: an object that hangs in other robots' hands is taken where the palm is.
+    pub fn change(
+        &mut self,
         world: &PhysicsWorld,
         robot: &Articulation,
         object: RigidBodyHandle,
-        others_hold: bool,
+        grip: Grip,
     ) -> bool {
         let Some(body) = world.bodies.get(object) else { return false };
-        let place = if others_hold { pose(&self.pulled_to) } else { self.place };
-        let place = pose::<World, Object>(&from_isometry(body.position())) * place;
-        let gap = place.displacement_to(&robot.frame_pose(world, self.palm));
-        gap.linear.norm() <= REACH_M && gap.angular.norm() <= REACH_RAD
+        let X_WO = pose::<World, Object>(&from_isometry(body.position()));
+        let X_OH = X_WO.inverse() * robot.frame_pose::<HandFrame>(world, self.palm);
+        match grip {
+            Grip::Open => true,
+            Grip::Close => is_in_reach(&self.place, &X_OH),
+            Grip::CloseBesideOthers if is_in_reach(&pose(&self.pulled_to), &X_OH) => {
+                self.pulled_to = Isometry3::from_parts(X_OH.translation.into(), X_OH.rotation);
+                true
+            }
+            Grip::CloseBesideOthers => false,
+        }
     }
 }

@@ -12,15 +12,14 @@ use mikoshi_ipc_types::{
 };
 use mikoshi_physics::{
     ActivePush, BuildWorldError, GRAVITY_M_S2, LoadWorldError, Noise, ObjectBody, Physics, PushScript,
-    SensorCounts, Spring, Stance, Standing, StepWorldError, begin, force_n, grasp_offsets,
+    SETTLING_S, SensorCounts, Spring, Stance, Standing, StepWorldError, begin, check_commands, force_n,
+    grasp_offsets,
 };
 use mikoshi_spatial::{Foot, Hand as HandFrame, Object, Pose, Twist, Wrench};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// How long the world comes to rest before tick 0.
-const SETTLING_S: f64 = 1.0;
 /// Sweeps over all contacts in a physics step.
 const SWEEPS: usize = 20;
 /// How soft contacts are. Rapier's own ratio, 10, lets soles creep back for a second after they have landed.
@@ -44,6 +43,8 @@ pub struct World {
     fingerprint: u64,
     tick: u64,
     commands: Vec<JointCommand>,
+    /// The hands of each robot that hold the object: bit h for hand h.
+    holding: Vec<u64>,
     pushes: Vec<ActivePush>,
     rejected: u64,
     touched: Vec<Touched>,
@@ -55,7 +56,6 @@ pub struct World {
 struct Robot {
     body: Articulation,
     hands: Vec<Hand>,
-    holding: u64,
     standing: Standing,
     noise: Option<Noise>,
     /// The readings of the last ticks: tick k at place k mod their number.
@@ -101,6 +101,9 @@ impl Physics for World {
         let bodies: Vec<&Articulation> = robots.iter().map(|robot| &robot.body).collect();
         let exclusions = Exclusions::of(&bodies);
         let count = robots.len();
+        let first_commands =
+            run.robots.iter().zip(&robots).map(|(spec, robot)| robot.first_command(scenario, spec));
+        let commands: Vec<_> = first_commands.collect();
         let mut it = Self {
             world,
             exclusions,
@@ -112,7 +115,8 @@ impl Physics for World {
             depth: scenario.sensors.delay_ticks as usize + 1,
             fingerprint: xxh3_64(format!("{} {run:?}", Self::ENGINE).as_bytes()),
             tick: 0,
-            commands: run.robots.iter().zip(&robots).map(|(spec, robot)| robot.first_command(spec)).collect(),
+            holding: commands.iter().map(|command| command.closed_hands).collect(),
+            commands,
             pushes: vec![ActivePush::default(); count + 1],
             rejected: 0,
             touched: vec![Touched::default(); count],
@@ -168,14 +172,7 @@ impl Physics for World {
     }
 
     fn step(&mut self, commands: &[JointCommand]) -> Result<(), StepWorldError> {
-        if commands.len() != self.robot_count() {
-            return Err(StepWorldError::CommandCount);
-        }
-        let mut values =
-            commands.iter().flat_map(|c| c.joint_position_ref_rad.iter().chain(&c.joint_velocity_ref_rad_s));
-        if !values.all(|value| value.is_finite()) {
-            return Err(StepWorldError::NotFinite);
-        }
+        check_commands(commands, self.robot_count())?;
         self.change_object();
         self.push_script.begin(&mut self.pushes, self.tick);
         self.close_and_open(commands);
@@ -298,7 +295,6 @@ impl Robot {
             .collect();
         let counts = SensorCounts { joints: body.joint_count(), hands: hands.len(), feet: MAX_FEET };
         Ok(Self {
-            holding: if scenario.begins_closed(&spec.member.name) { all_hands(hands.len()) } else { 0 },
             standing: Standing {
                 soles: body.body.sole_rectangles,
                 weight_n: body.body.model.total_mass_kg() * GRAVITY_M_S2,
@@ -316,8 +312,10 @@ impl Robot {
     }
 
     /// What its drives were told before tick 0.
-    fn first_command(&self, spec: &mikoshi_config::RobotSpec) -> JointCommand {
-        let mut command = JointCommand { closed_hands: self.holding, ..JointCommand::zeroed() };
+    fn first_command(&self, scenario: &Scenario, spec: &mikoshi_config::RobotSpec) -> JointCommand {
+        let holds = scenario.begins_closed(&spec.member.name);
+        let closed_hands = if holds { all_hands(self.hands.len()) } else { 0 };
+        let mut command = JointCommand { closed_hands, ..JointCommand::zeroed() };
         let posture = command.joint_position_ref_rad.iter_mut().zip(&spec.initial_posture_rad);
         posture.for_each(|(to, from)| *to = *from);
         command
@@ -339,7 +337,7 @@ impl Robot {
         world: &PhysicsWorld,
         touched: &Touched,
         (tick, depth, substeps): (u64, usize, u64),
-        is_rejected: bool,
+        (holding, is_rejected): (u64, bool),
     ) {
         let mean = 1.0 / substeps as f64;
         let reading = &mut self.readings[tick as usize % depth];
@@ -367,7 +365,7 @@ impl Robot {
             reading.ankle_wrench[index] = self.body.reading(world, sensor, &touch);
         }
         (reading.imu_angular_velocity_rad_s, reading.imu_specific_force_m_s2) = self.body.inertial(world);
-        reading.holding_hands = self.holding;
+        reading.holding_hands = holding;
         reading.command_rejected = u64::from(is_rejected);
         if let Some(noise) = &self.noise {
             noise.add(tick, reading);
@@ -389,7 +387,7 @@ impl Robot {
 impl World {
     /// One step of physics, with drives told to be at `share` of the way from the last commands to these.
     fn substep(&mut self, commands: &[JointCommand], share: f64) {
-        let Self { world, robots, commands: last, .. } = self;
+        let Self { world, robots, commands: last, holding, .. } = self;
         if let Some(object) = world.bodies.get_mut(self.object) {
             object.reset_forces(false);
             object.reset_torques(false);
@@ -399,13 +397,13 @@ impl World {
             object.add_force(vector(&pushed), false);
         }
         for (index, (robot, (from, to))) in robots.iter_mut().zip(last.iter().zip(commands)).enumerate() {
-            let Robot { body, hands, holding, torque_peak_nm, saturated_joints, .. } = robot;
+            let Robot { body, hands, torque_peak_nm, saturated_joints, .. } = robot;
             body.set_drives(world, (from, to, share), |joint, demand_nm, is_saturated| {
                 torque_peak_nm[joint] = torque_peak_nm[joint].max(demand_nm);
                 *saturated_joints |= u64::from(is_saturated) << joint;
             });
             for (bit, hand) in hands.iter_mut().enumerate() {
-                hand.pull(world, body, self.object, &self.spring, *holding & 1 << bit != 0);
+                hand.pull(world, body, self.object, &self.spring, holding[index] & 1 << bit != 0);
             }
             body.push(world, Vector3::from(force_n(&self.pushes, index + 1, self.tick)));
             body.note_motions(world);
@@ -433,23 +431,11 @@ impl World {
     }
 
     fn close_and_open(&mut self, commands: &[JointCommand]) {
-        let held = self.robots.iter().enumerate();
-        let holders = held.fold(0_u64, |set, (index, robot)| set | u64::from(robot.holding != 0) << index);
-        for (number, (robot, command)) in self.robots.iter_mut().zip(commands).enumerate() {
-            let others_hold = holders & !(1 << number) != 0;
-            for (index, hand) in robot.hands.iter_mut().enumerate() {
-                let bit = 1 << index;
-                let (holds, shall_hold) = (robot.holding & bit != 0, command.closed_hands & bit != 0);
-                if holds != shall_hold
-                    && (holds || hand.is_in_reach(&self.world, &robot.body, self.object, others_hold))
-                {
-                    robot.holding ^= bit;
-                    if shall_hold && others_hold {
-                        hand.take_hold(&self.world, &robot.body, self.object);
-                    }
-                }
-            }
-        }
+        let Self { world, robots, holding, object, .. } = self;
+        mikoshi_physics::close_and_open(holding, commands, |robot, hand, grip| {
+            let Robot { body, hands, .. } = &mut robots[robot];
+            hands.get_mut(hand).is_some_and(|hand| hand.change(world, body, *object, grip))
+        });
     }
 
     fn note_pushes(&mut self) {
@@ -463,7 +449,8 @@ impl World {
         let rejected = core::mem::take(&mut self.rejected);
         for (index, (robot, touched)) in self.robots.iter_mut().zip(&self.touched).enumerate() {
             let of_tick = (self.tick, self.depth, self.substeps);
-            robot.observe(&self.world, touched, of_tick, rejected & 1 << index != 0);
+            let of_robot = (self.holding[index], rejected & 1 << index != 0);
+            robot.observe(&self.world, touched, of_tick, of_robot);
         }
         let truth = &mut self.object_truth;
         if let Some(object) = self.world.bodies.get(self.object) {

@@ -183,11 +183,7 @@ mod tests {
         assert!(plain.iter().all(|one| one.placement.is_empty()), "{plain:?}");
         let placed = scenario(&[("placement.servo_cores", "[2, 3]"), ("placement.fifo_priority", "20")]);
         let placed = enlisted(&placed, false, None);
-        assert!(
-            placed[1]
-                .placement
-                .ends_with("[Service]\nLimitRTPRIO=20\n")
-        );
+        assert!(placed[1].placement.ends_with("[Service]\nLimitRTPRIO=20\n"));
         assert!(placed[4].placement.contains("\nCPUAffinity=3\n"), "{}", placed[4].placement);
     }
 }
