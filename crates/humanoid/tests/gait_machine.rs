@@ -28,6 +28,7 @@ fn next_as(phase: GaitPhase, clock: StepClock, mirrored: bool) -> GaitPhase {
         clock,
         timing: &timing,
         feet: &feet,
+        plane_m: 0.0,
         zmp_ref: ZMP,
         middle: MIDDLE,
         mirrored,

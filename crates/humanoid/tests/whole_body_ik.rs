@@ -171,6 +171,37 @@ fn a_foot_out_of_reach_leaves_the_centre_of_mass_where_it_should_be() {
     assert!(state.joint_velocity.iter().all(|rate| rate.abs() < 1e-2));
 }
 
+/// The left sole lies half on a board of 15 mm, its outer side up, and the robot comes to stand on it alone: its ankle, which
+/// has 20 degrees and keeps 3 of them, would need more.
+#[test]
+fn where_an_ankle_has_no_room_the_body_leans_and_neither_hands_nor_balance_give_way() {
+    let (mut setup, mut state) = common::settled();
+    let mut targets = setup.targets;
+    targets.stance = Side::Left;
+    let start = targets;
+    let ankle = setup.model.find_joint("LLEG_JOINT5").unwrap();
+    let (mut most, mut lean) = (0.0_f64, 0.0_f64);
+    for tick in 0..600 {
+        // There within .5 s, and back after 1 s more.
+        let share = (f64::from(tick) / 100.0).min(1.0).min((400.0 - f64::from(tick)) / 100.0).max(0.0);
+        let tilt = Twist::new(Vector3::zeros(), Vector3::new(0.11 * share, 0.0, 0.0));
+        targets.feet.left = start.feet.left.displaced(&tilt);
+        targets.com.y = start.com.y + 0.08 * share;
+        let before = state;
+        let report = follow(&mut setup, &mut state, &targets, 1)[0];
+        assert_limits_respected(&setup, &before, &state);
+        assert!(report.hand_error_m.iter().all(|&e| e < 2e-3), "tick {tick}: {report:?}");
+        assert!(report.com_error_m < 1e-3 && report.foot_error_m < 1e-3, "tick {tick}: {report:?}");
+        most = most.max(state.joint_position[ankle]);
+        lean = lean.max(report.waist_error_rad);
+    }
+    let limit = setup.model.joints()[ankle].upper - setup.ik.config().gains.limit_margin;
+    assert!((most - limit).abs() < 1e-3, "the ankle was to be at its limit: {most}, {limit}");
+    assert!(lean > 0.005, "and the body to lean: {lean}");
+    let upright = follow(&mut setup, &mut state, &targets, 1)[0].waist_error_rad;
+    assert!(upright < 1e-4, "it is upright again: {upright}");
+}
+
 #[test]
 fn it_makes_no_difference_which_of_two_feet_on_the_ground_is_the_base() {
     let (mut setup, mut by_right) = common::settled();

@@ -179,7 +179,7 @@ impl Legs {
         let tolerance_m = self.gait.config().swing.plane_tolerance_m;
         for side in Side::BOTH {
             let foot = Foothold { height: feet[side].translation.z, ..gait.feet[side] };
-            gait.feet[side] = foot.on_plane_within(tolerance_m);
+            gait.feet[side] = foot.on_plane_within(gait.ground.plane_m, tolerance_m);
         }
         LegsState {
             gait,

@@ -1,9 +1,11 @@
 //! One robot's gait: from the team's step clock and the hands' references to references of the feet and
 //! of the centre of mass.
 
+use super::expected_ground::ExpectedGround;
 use super::foot_placement::{FootError, FootPlacement, HandCentre};
 use super::ground_pose::{GroundPose, wrap};
 use super::machine::{GaitPhase, SwingingFoot, TransitionInputs};
+use super::pivoting::Pivoting;
 use super::preview::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError};
 use super::settling::Settling;
 use super::step_adjustment::{StepAdjustment, StepInHand};
@@ -103,6 +105,10 @@ pub struct GaitState {
     pub trouble: Trouble,
     /// Whether the foot that is to bear next has found its ground.
     pub settling: Settling,
+    /// Whether the foot that bears turns on the ground.
+    pub pivoting: Pivoting,
+    /// Where swings end.
+    pub ground: ExpectedGround,
 }
 
 /// How a robot is off balance beyond what its soles can do about it.
@@ -200,6 +206,8 @@ impl Gait {
             zmp_ref: com,
             trouble: Trouble::default(),
             settling: Settling::default(),
+            pivoting: Pivoting::default(),
+            ground: ExpectedGround::default(),
         }
     }
 
@@ -283,6 +291,7 @@ impl Gait {
             clock: inputs.clock,
             timing,
             feet: &state.feet,
+            plane_m: state.ground.plane_m,
             zmp_ref: state.zmp_ref,
             middle: self.middle(&footholds(state)),
             mirrored: self.config.mirrored,
@@ -297,11 +306,17 @@ impl Gait {
             foot.swing.advance(&self.config.swing, (1.0 - share) * duration, dt);
         }
         if let Some((side, foothold)) = landed {
-            let foothold = foothold.on_plane_within(self.config.swing.plane_tolerance_m);
+            let tolerance_m = self.config.swing.plane_tolerance_m;
+            let foothold = foothold.on_plane_within(state.ground.plane_m, tolerance_m);
             // A leg sags, and its foot lands some tenths of a millimetre from where it was sent, step for step
             // on the same side: whoever believes that it stands where it was sent walks astray.
             let pose = inputs.soles.map_or(foothold.pose, |soles| soles[side]);
             state.feet[side] = Foothold { pose, ..foothold };
+            state.ground = state.ground.after_landing(&state.feet, tolerance_m);
+        }
+        if let Some(soles) = &inputs.soles {
+            let stance = stance_on_ground(&state.phase);
+            state.pivoting = state.pivoting.after(stance, &mut state.feet, soles, dt);
         }
         state.settling = state.settling.after(&state.phase, &inputs.soles_turn);
         self.plan_step(state, inputs);
@@ -476,7 +491,7 @@ impl Gait {
             let off = heights[stance] - *height;
             *height += (off - off.clamp(-SETTLED_M, SETTLED_M)) * (dt / SETTLE_S).min(1.0);
         }
-        if wanted - comes > MISSING_SHARE && *height > -swing.lowering_max_m {
+        if wanted - comes > MISSING_SHARE && *height > state.ground.plane_m - swing.lowering_max_m {
             *height -= swing.reaching_m_s * dt;
         }
     }
@@ -619,6 +634,14 @@ fn stance(phase: &GaitPhase) -> Option<Side> {
         None => phase.planned_step().map(|step| step.side),
     };
     moving.map(Side::opposite)
+}
+
+/// The foot that bears a step, once the other one has landed.
+fn stance_on_ground(phase: &GaitPhase) -> Option<Side> {
+    match phase {
+        GaitPhase::DoubleSupport { landing: None, .. } | GaitPhase::SingleSupport { .. } => stance(phase),
+        _ => None,
+    }
 }
 
 /// Footholds after the step that is planned, if one is.

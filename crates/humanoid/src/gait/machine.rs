@@ -91,6 +91,8 @@ pub struct TransitionInputs<'a> {
     pub timing: &'a StepTiming,
     /// Where the feet stand.
     pub feet: &'a PerFoot<Foothold>,
+    /// Height at which the ground is expected \[m\].
+    pub plane_m: f64,
     /// The zero moment point's reference now.
     pub zmp_ref: Vector2<f64>,
     /// Middle between both feet's zero moment points.
@@ -103,7 +105,7 @@ impl GaitPhase {
     /// The phase in the tick of `inputs.clock`. A step that becomes the next one is planned in place,
     /// for the planner to move.
     pub fn next(self, inputs: &TransitionInputs<'_>) -> Self {
-        let TransitionInputs { clock, timing, feet, zmp_ref, middle, mirrored } = *inputs;
+        let TransitionInputs { clock, timing, feet, plane_m, zmp_ref, middle, mirrored } = *inputs;
         match (self, clock) {
             (Self::Standing { .. }, StepClock::Stepping { step_index: 0, tick_in_step, swing, .. })
                 if tick_in_step < timing.lead || tick_in_step == timing.hurried_start() =>
@@ -119,7 +121,7 @@ impl GaitPhase {
                 StepClock::Stepping { step_index: 0, tick_in_step, .. },
             ) => {
                 if may_lift(timing, 0, tick_in_step) {
-                    Self::lift_off(step, feet)
+                    Self::lift_off(step, feet, plane_m)
                 } else {
                     Self::ShiftingWeight { zmp_from, step }
                 }
@@ -145,7 +147,7 @@ impl GaitPhase {
                 StepClock::Stepping { step_index, tick_in_step, .. },
             ) if step.index == step_index => {
                 if landing.is_none() && may_lift(timing, step_index, tick_in_step) {
-                    Self::lift_off(step, feet)
+                    Self::lift_off(step, feet, plane_m)
                 } else {
                     self
                 }
@@ -157,8 +159,8 @@ impl GaitPhase {
         }
     }
 
-    fn lift_off(step: PlannedStep, feet: &PerFoot<Foothold>) -> Self {
-        let swing = Swing::new(feet[step.side], Foothold::on_ground(step.to));
+    fn lift_off(step: PlannedStep, feet: &PerFoot<Foothold>, plane_m: f64) -> Self {
+        let swing = Swing::new(feet[step.side], Foothold { pose: step.to, height: plane_m });
         Self::SingleSupport { index: step.index, foot: SwingingFoot { side: step.side, swing } }
     }
 

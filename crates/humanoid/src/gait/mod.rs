@@ -13,9 +13,11 @@
 
 mod coming_to_rest;
 mod controller;
+mod expected_ground;
 mod foot_placement;
 mod ground_pose;
 mod machine;
+mod pivoting;
 mod preview;
 mod riccati;
 mod settling;
@@ -29,9 +31,11 @@ mod zmp_reference;
 
 pub use coming_to_rest::ComingToRest;
 pub use controller::{FootReference, Gait, GaitConfig, GaitInputs, GaitReference, GaitState, Trouble};
+pub use expected_ground::ExpectedGround;
 pub use foot_placement::{FootError, FootPlacement, HandCentre, MAX_HANDS};
 pub use ground_pose::{GroundPose, heading, wrap};
 pub use machine::{GaitPhase, PlannedStep, SwingingFoot, TransitionInputs};
+pub use pivoting::Pivoting;
 pub use preview::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError};
 pub use riccati::solve_discrete_riccati;
 pub use settling::Settling;

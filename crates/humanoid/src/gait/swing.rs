@@ -20,9 +20,9 @@ impl Foothold {
         Self { pose, height: 0.0 }
     }
 
-    /// On the plane if it is within `tolerance` of it.
-    pub fn on_plane_within(self, tolerance: f64) -> Self {
-        if self.height.abs() <= tolerance { Self::on_ground(self.pose) } else { self }
+    /// On the plane at `height` if it is within `tolerance` of it.
+    pub fn on_plane_within(self, height: f64, tolerance: f64) -> Self {
+        if (self.height - height).abs() <= tolerance { Self { height, ..self } } else { self }
     }
 
     /// As a pose in the world.
@@ -211,7 +211,8 @@ impl Swing {
             }
             // On the plane a foot has come to stay, even if the other one still bears all.
             SwingContact::Landed { at }
-                if force >= 0.5 * config.contact_force_n || at.height.abs() <= config.plane_tolerance_m =>
+                if force >= 0.5 * config.contact_force_n
+                    || (at.height - self.to.height).abs() <= config.plane_tolerance_m =>
             {
                 SwingContact::Landed { at }
             }
@@ -219,7 +220,7 @@ impl Swing {
             // A foot that is waiting for the ground has found it: what is lowered slowly hardly bounces.
             SwingContact::Lowering { at } if touches => SwingContact::Landed { at },
             SwingContact::Lowering { at } => {
-                let lowest = (-config.lowering_max_m).min(at.height);
+                let lowest = (self.to.height - config.lowering_max_m).min(at.height);
                 let height = (at.height - config.lowering_m_s * dt).max(lowest);
                 SwingContact::Lowering { at: Foothold { height, ..at } }
             }
@@ -232,7 +233,8 @@ impl Swing {
             SwingContact::Swinging { .. } => self.in_the_air(config, s, duration),
             SwingContact::Landed { at } => (at.in_world(), Twist::zero()),
             SwingContact::Lowering { at } => {
-                let speed = if at.height > -config.lowering_max_m { -config.lowering_m_s } else { 0.0 };
+                let is_lowest = at.height <= self.to.height - config.lowering_max_m;
+                let speed = if is_lowest { 0.0 } else { -config.lowering_m_s };
                 (at.in_world(), Twist::new(Vector3::new(0.0, 0.0, speed), Vector3::zeros()))
             }
         }

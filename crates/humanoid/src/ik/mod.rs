@@ -6,7 +6,8 @@
 //!   drives, divided by the position gain, a standing error.
 //! - The pseudo-inverse becomes a damped least-squares problem in a box. Position and velocity limits
 //!   of every joint hold exactly, and weights that lie orders of magnitude apart decide who gives way
-//!   where not all can be had: posture before hands, hands before feet, feet before balance.
+//!   where not all can be had: posture before hands, hands before feet, feet before balance. Where the leg that stands
+//!   has no room left, the waist gives way, too, before the hands do.
 //! - What freedom is left returns to a preferred posture and away from limits.
 //! - In double support the other foot has a reference too, where it stands: held "where it is" it would
 //!   keep every small error of linearization.
@@ -19,7 +20,7 @@ pub use settle::SettlePostureError;
 
 use crate::balance::{PerFoot, Side};
 use crate::kinematics::Kinematics;
-use crate::model::{FrameId, MAX_HANDS, MAX_JOINTS, Model};
+use crate::model::{FrameId, Joint, MAX_HANDS, MAX_JOINTS, Model};
 use bounded_quadratic::{ActiveSet, BoundedQuadratic};
 use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, log};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -50,6 +51,10 @@ pub struct IkConfig {
 pub struct IkGains {
     /// Weight of the centre of mass and of the waist's attitude, per m² and rad².
     pub balance_weight: f64,
+    /// Weight of the waist's attitude while a joint of the leg that stands has no room.
+    pub leaning_weight: f64,
+    /// Room of that joint beyond its limit's margin below which the waist's attitude loses weight \[rad\].
+    pub leaning_zone: f64,
     /// Weight of the foot that is not the base.
     pub foot_weight: f64,
     /// Weight of each hand.
@@ -84,6 +89,8 @@ impl Default for IkGains {
     fn default() -> Self {
         Self {
             balance_weight: 1e5,
+            leaning_weight: 0.1,
+            leaning_zone: 0.06,
             foot_weight: 1e3,
             hand_weight: 1.0,
             damping: 0.02,
@@ -244,6 +251,8 @@ pub struct WholeBodyIk {
     speed_step: [f64; MAX_JOINTS],
     /// Joints of the trunk.
     trunk: u64,
+    /// Joints of each leg.
+    legs: PerFoot<u64>,
 }
 
 /// Workspace of [`WholeBodyIk`]; it allocates at construction and never after.
@@ -298,6 +307,8 @@ impl WholeBodyIk {
         for (name, value) in [
             ("period_s", config.period_s),
             ("balance_weight", gains.balance_weight),
+            ("leaning_weight", gains.leaning_weight),
+            ("leaning_zone", gains.leaning_zone),
             ("foot_weight", gains.foot_weight),
             ("hand_weight", gains.hand_weight),
             ("damping", gains.damping),
@@ -318,7 +329,8 @@ impl WholeBodyIk {
             let cap = gains.arm_speed.filter(|_| arms >> j & 1 == 1).unwrap_or(f64::INFINITY);
             speed_step[j] = joint.velocity.min(cap) * config.period_s;
         }
-        Ok(Self { config, speed_step, trunk })
+        let legs = PerFoot::from_fn(|side| model.path(model.frame(config.feet[side]).body));
+        Ok(Self { config, speed_step, trunk, legs })
     }
 
     /// What it was made from.
@@ -433,7 +445,7 @@ impl WholeBodyIk {
             &Task {
                 error: Twist::new(Vector3::zeros(), attitude_error(&waist.rotation, &targets.waist_attitude)),
                 residual: residual.waist,
-                weight: [0.0, gains.balance_weight],
+                weight: [0.0, self.waist_weight(model, state, targets.stance)],
             },
         );
 
@@ -460,6 +472,29 @@ impl WholeBodyIk {
                 &Task { error: hand.displacement_to(target), residual, weight: [gains.hand_weight; 2] },
             );
         }
+    }
+
+    /// Weight of the waist's attitude: with r the least room of a joint of the stance leg between its position and its
+    /// limit's margin, and zone r₀, `w (w₀ / w)^ν`, ν = 1 − (r / r₀)² within 0 and 1. A joint that comes fast to its limit
+    /// is slowed down before it is there, so that most of the weight is to be gone by then.
+    ///
+    /// A leg with a joint at its limit has five left: what stands on it can't have centre of mass, height and attitude all
+    /// as they are asked for. The centre of mass is balance itself, and hands would have to be moved by ten times what it
+    /// lacks. The body leans on its hip for a third of it.
+    fn waist_weight(&self, model: &Model, state: &IkState, stance: Side) -> f64 {
+        let gains = &self.config.gains;
+        let room = |j: usize| {
+            let (joint, q) = (&model.joints()[j], state.joint_position[j]);
+            (q - joint.lower).min(joint.upper - q) - self.limit_margin(joint)
+        };
+        let leg = (0..model.joint_count()).filter(|j| self.legs[stance] >> j & 1 == 1);
+        let share = leg.map(room).fold(gains.leaning_zone, f64::min).max(0.0) / gains.leaning_zone;
+        gains.balance_weight * (gains.leaning_weight / gains.balance_weight).powf(1.0 - share * share)
+    }
+
+    /// How far from its limits this joint stops: never so much that no room would be left.
+    fn limit_margin(&self, joint: &Joint) -> f64 {
+        self.config.gains.limit_margin.min(0.25 * (joint.upper - joint.lower))
     }
 
     /// Adds Jᵀ W J to the matrix and Jᵀ W e to the vector of the program, and damping for what the task
@@ -496,8 +531,7 @@ impl WholeBodyIk {
         let mut by_position = 0;
         for (j, (joint, &speed)) in model.joints().iter().zip(speed_step).enumerate() {
             let q = state.joint_position[j];
-            // Never more margin than would leave room.
-            let margin = gains.limit_margin.min(0.25 * (joint.upper - joint.lower));
+            let margin = self.limit_margin(joint);
             let to_upper = gains.limit_approach * (joint.upper - margin - q);
             let to_lower = gains.limit_approach * (joint.lower + margin - q);
             if to_upper < speed || to_lower > -speed {
