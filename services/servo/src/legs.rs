@@ -8,11 +8,11 @@ use mikoshi_humanoid::balance::{
     ExternalLoad, GroundTilt, Pendulum, PerFoot, Side, Stabiliser, StabiliserConfig, StabiliserInputs,
     StabiliserState,
 };
-use mikoshi_humanoid::estimate::FootContact;
+use mikoshi_humanoid::estimate::{FootContact, Pivoting};
 use mikoshi_humanoid::gait::{
     FootPlacement, Foothold, Gait, GaitConfig, GaitInputs, GaitPhase, GaitReference, GaitState, GroundPose,
     HandCentre, PreviewConfig, SoleCorrection, SoleTracking, StepClock, StepTiming, StepWish, SwingConfig,
-    wrap,
+    heading, wrap,
 };
 use mikoshi_ipc_types::MAX_HANDS;
 use mikoshi_spatial::{Base, Foot, Hand, Pose, Twist, World, Wrench};
@@ -50,6 +50,8 @@ pub(crate) struct LegsState {
     pub ground_tilt: PerFoot<Vector3<f64>>,
     /// How much of the base's estimate rests on each foot, 0 to 1.
     trust: PerFoot<f64>,
+    /// How far each foot has turned on the ground.
+    pivoting: PerFoot<Pivoting>,
     /// Base as the last tick's command has it.
     pub base_commanded: Pose<World, Base>,
     /// Of the hands' references in the last command.
@@ -149,6 +151,7 @@ impl Legs {
             sole_correction: PerFoot { right: Twist::zero(), left: Twist::zero() },
             ground_tilt: PerFoot { right: Vector3::zeros(), left: Vector3::zeros() },
             trust: PerFoot { right: 1.0, left: 1.0 },
+            pivoting: PerFoot { right: Pivoting::default(), left: Pivoting::default() },
             base_commanded: *X_WB,
             hand_centre: None,
             steps: 0,
@@ -187,6 +190,7 @@ impl Legs {
             sole_correction: PerFoot { right: Twist::zero(), left: Twist::zero() },
             ground_tilt: PerFoot { right: Vector3::zeros(), left: Vector3::zeros() },
             trust: PerFoot { right: 1.0, left: 1.0 },
+            pivoting: PerFoot { right: Pivoting::default(), left: Pivoting::default() },
             base_commanded: *X_WB,
             hand_centre: None,
             steps: before.steps,
@@ -198,7 +202,7 @@ impl Legs {
     /// disagree don't make the base jump.
     pub(crate) fn contacts(&self, state: &LegsState) -> PerFoot<FootContact> {
         PerFoot::from_fn(|side| FootContact {
-            pose: state.gait.feet[side].in_world(),
+            pose: state.pivoting[side].turn(state.gait.feet[side]).in_world(),
             weight: state.trust[side],
         })
     }
@@ -265,6 +269,9 @@ impl Legs {
         );
         state.steps += u64::from(is_swinging(&state.gait) && !was_swinging);
         self.shift_trust(state);
+        if let Some(felt) = felt {
+            self.follow_pivots(state, felt);
+        }
         self.correct_soles(state, &now, &next, felt);
 
         self.follow_ground(state, &next, felt);
@@ -387,6 +394,22 @@ impl Legs {
             let target = if stands(side) { 1.0 } else { 0.0 };
             let trust = &mut state.trust[side];
             *trust = if is_up[side] { 0.0 } else { *trust + (target - *trust).clamp(-most, most) };
+        }
+    }
+
+    /// What feet do that turn on the ground the estimate of the base knows, and nobody else: commands that followed them
+    /// would have them turn on.
+    fn follow_pivots(&self, state: &mut LegsState, felt: &Felt) {
+        let stands = matches!(state.gait.phase, GaitPhase::Standing { .. });
+        for side in Side::BOTH {
+            let pivoting = &mut state.pivoting[side];
+            let is_up = state.gait.phase.swinging_foot().is_some_and(|foot| foot.side == side);
+            *pivoting = if is_up {
+                Pivoting::default()
+            } else {
+                let sole = heading(&felt.soles[side].rotation);
+                pivoting.after(wrap(sole - state.gait.feet[side].pose.yaw), stands, self.period_s)
+            };
         }
     }
 

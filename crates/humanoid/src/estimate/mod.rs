@@ -3,8 +3,10 @@
 
 mod base;
 mod force_sensor;
+mod pivoting;
 mod support_polygon;
 
 pub use base::{BaseEstimate, BaseEstimator, BaseEstimatorGains, BaseEstimatorState, FootContact, Readings};
 pub use force_sensor::{CarriedMotion, ForceTorqueSensor, zero_moment_point};
+pub use pivoting::Pivoting;
 pub use support_polygon::{SoleRectangle, SupportPolygon};

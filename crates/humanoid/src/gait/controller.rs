@@ -5,7 +5,6 @@ use super::expected_ground::ExpectedGround;
 use super::foot_placement::{FootError, FootPlacement, HandCentre};
 use super::ground_pose::{GroundPose, wrap};
 use super::machine::{GaitPhase, SwingingFoot, TransitionInputs};
-use super::pivoting::Pivoting;
 use super::preview::{PreviewConfig, PreviewControl, PreviewState, SolvePreviewError};
 use super::settling::Settling;
 use super::step_adjustment::{StepAdjustment, StepInHand};
@@ -105,8 +104,6 @@ pub struct GaitState {
     pub trouble: Trouble,
     /// Whether the foot that is to bear next has found its ground.
     pub settling: Settling,
-    /// Whether the foot that bears turns on the ground.
-    pub pivoting: Pivoting,
     /// Where swings end.
     pub ground: ExpectedGround,
 }
@@ -206,7 +203,6 @@ impl Gait {
             zmp_ref: com,
             trouble: Trouble::default(),
             settling: Settling::default(),
-            pivoting: Pivoting::default(),
             ground: ExpectedGround::default(),
         }
     }
@@ -313,10 +309,6 @@ impl Gait {
             let pose = inputs.soles.map_or(foothold.pose, |soles| soles[side]);
             state.feet[side] = Foothold { pose, ..foothold };
             state.ground = state.ground.after_landing(&state.feet, tolerance_m);
-        }
-        if let Some(soles) = &inputs.soles {
-            let stance = stance_on_ground(&state.phase);
-            state.pivoting = state.pivoting.after(stance, &mut state.feet, soles, dt);
         }
         state.settling = state.settling.after(&state.phase, &inputs.soles_turn);
         self.plan_step(state, inputs);
@@ -634,14 +626,6 @@ fn stance(phase: &GaitPhase) -> Option<Side> {
         None => phase.planned_step().map(|step| step.side),
     };
     moving.map(Side::opposite)
-}
-
-/// The foot that bears a step, once the other one has landed.
-fn stance_on_ground(phase: &GaitPhase) -> Option<Side> {
-    match phase {
-        GaitPhase::DoubleSupport { landing: None, .. } | GaitPhase::SingleSupport { .. } => stance(phase),
-        _ => None,
-    }
 }
 
 /// Footholds after the step that is planned, if one is.

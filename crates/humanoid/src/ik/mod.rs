@@ -55,6 +55,8 @@ pub struct IkGains {
     pub leaning_weight: f64,
     /// Room of that joint beyond its limit's margin below which the waist's attitude loses weight \[rad\].
     pub leaning_zone: f64,
+    /// Weight of the trunk's increments meanwhile: it would bend as far as it can to spare the waist.
+    pub leaning_trunk_weight: f64,
     /// Weight of the foot that is not the base.
     pub foot_weight: f64,
     /// Weight of each hand.
@@ -91,6 +93,7 @@ impl Default for IkGains {
             balance_weight: 1e5,
             leaning_weight: 0.1,
             leaning_zone: 0.06,
+            leaning_trunk_weight: 100.0,
             foot_weight: 1e3,
             hand_weight: 1.0,
             damping: 0.02,
@@ -309,6 +312,7 @@ impl WholeBodyIk {
             ("balance_weight", gains.balance_weight),
             ("leaning_weight", gains.leaning_weight),
             ("leaning_zone", gains.leaning_zone),
+            ("leaning_trunk_weight", gains.leaning_trunk_weight),
             ("foot_weight", gains.foot_weight),
             ("hand_weight", gains.hand_weight),
             ("damping", gains.damping),
@@ -416,13 +420,16 @@ impl WholeBodyIk {
         }
         program.linear = [0.0; MAX_JOINTS];
         let damping = gains.damping * gains.damping;
+        let leans = self.lack_of_room(model, state, targets.stance);
         for (j, joint) in model.joints().iter().enumerate() {
             let q = state.joint_position[j];
             let room = gains.limit_margin + gains.repulsion_zone;
             let nearness = |distance: f64| ((room - distance) / gains.repulsion_zone).clamp(0.0, 1.0);
             let flee = nearness(q - joint.lower).powi(2) - nearness(joint.upper - q).powi(2);
             let posture_step = gains.posture_gain * (config.posture[j] - q) + gains.repulsion_step * flee;
-            program.hessian[(j, j)] = damping;
+            let is_trunk = self.trunk >> j & 1 == 1;
+            program.hessian[(j, j)] =
+                if is_trunk { damping + gains.leaning_trunk_weight * leans } else { damping };
             program.linear[j] = damping * posture_step;
         }
 
@@ -445,7 +452,10 @@ impl WholeBodyIk {
             &Task {
                 error: Twist::new(Vector3::zeros(), attitude_error(&waist.rotation, &targets.waist_attitude)),
                 residual: residual.waist,
-                weight: [0.0, self.waist_weight(model, state, targets.stance)],
+                weight: [
+                    0.0,
+                    gains.balance_weight * (gains.leaning_weight / gains.balance_weight).powf(leans),
+                ],
             },
         );
 
@@ -474,22 +484,22 @@ impl WholeBodyIk {
         }
     }
 
-    /// Weight of the waist's attitude: with r the least room of a joint of the stance leg between its position and its
-    /// limit's margin, and zone r₀, `w (w₀ / w)^ν`, ν = 1 − (r / r₀)² within 0 and 1. A joint that comes fast to its limit
-    /// is slowed down before it is there, so that most of the weight is to be gone by then.
+    /// How little room the leg that stands has left, 0 to 1: `ν = 1 − (r / r₀)²` with r the least room of one of its joints
+    /// between its position and its limit's margin, and zone r₀. A joint that comes fast to its limit is slowed down before it
+    /// is there.
     ///
     /// A leg with a joint at its limit has five left: what stands on it can't have centre of mass, height and attitude all
     /// as they are asked for. The centre of mass is balance itself, and hands would have to be moved by ten times what it
-    /// lacks. The body leans on its hip for a third of it.
-    fn waist_weight(&self, model: &Model, state: &IkState, stance: Side) -> f64 {
-        let gains = &self.config.gains;
+    /// lacks. The body leans on its hip for a third of it: of the weight w of the waist's attitude `w (w₀ / w)^ν` is left.
+    fn lack_of_room(&self, model: &Model, state: &IkState, stance: Side) -> f64 {
+        let zone = self.config.gains.leaning_zone;
         let room = |j: usize| {
             let (joint, q) = (&model.joints()[j], state.joint_position[j]);
             (q - joint.lower).min(joint.upper - q) - self.limit_margin(joint)
         };
         let leg = (0..model.joint_count()).filter(|j| self.legs[stance] >> j & 1 == 1);
-        let share = leg.map(room).fold(gains.leaning_zone, f64::min).max(0.0) / gains.leaning_zone;
-        gains.balance_weight * (gains.leaning_weight / gains.balance_weight).powf(1.0 - share * share)
+        let share = leg.map(room).fold(zone, f64::min).max(0.0) / zone;
+        1.0 - share * share
     }
 
     /// How far from its limits this joint stops: never so much that no room would be left.
