@@ -416,6 +416,7 @@ impl Transport for IceoryxTransport {
             topic,
             source,
             is_gathering: is_gathering(phase),
+            is_last: phase.inputs.last().is_some_and(|input| input.topic == topic),
             bell: Doorbell::default(),
             arrived: Box::new(Frame::zeroed()),
             early: None,
@@ -492,6 +493,8 @@ pub struct IceoryxSubscriber<P: Payload> {
     source: Source,
     /// Whether it sleeps alone.
     is_gathering: bool,
+    /// Whether its phase has then heard all inputs: they are received in the schedule's order.
+    is_last: bool,
     bell: Doorbell,
     /// Where frames are copied to before they are looked at: shared memory may change under the eyes.
     arrived: Box<Frame<P>>,
@@ -502,14 +505,16 @@ pub struct IceoryxSubscriber<P: Payload> {
 impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
         let received = self.receive_in_time(tick, frame);
-        self.process.heard_ns.set(now_ns());
+        if self.is_last {
+            self.process.heard_ns.set(now_ns());
+        }
         received
     }
 }
 
 impl<P: Payload> IceoryxSubscriber<P> {
     fn receive_in_time(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
-        let Self { process, port, topic, source, is_gathering, bell, arrived, early } = self;
+        let Self { process, port, topic, source, is_gathering, bell, arrived, early, .. } = self;
         let (topic, due_ns) = (*topic, process.due_ns.get());
         let missing = TickError::InputMissing { topic, tick };
         // By the clock one goes on without what was lost, and uses what follows in its turn.
