@@ -335,6 +335,40 @@ mod tests {
         bed.call();
     }
 
+    /// How often a wait polled before the work that is done in it, if it was; what it finds is there from poll `found_at`
+    /// on, or from the work on.
+    fn polls_before_work(yield_for: Duration, lets_others_go_first: bool, found_at: u32) -> Option<u32> {
+        let (polls, worked_after) = (AtomicU32::new(0), AtomicU32::new(0));
+        let poll = || {
+            let is_there = polls.fetch_add(1, Ordering::Relaxed) == found_at;
+            Ok((is_there || worked_after.load(Ordering::Relaxed) > 0).then_some(()))
+        };
+        let work = || worked_after.store(polls.load(Ordering::Relaxed), Ordering::Relaxed);
+        let meanwhile = Meanwhile { lets_others_go_first, work };
+        let policy = WaitPolicy { yield_for, up_early: Duration::ZERO };
+        // Nobody sleeps: what came during the work is found after it.
+        assert_eq!(Bed::default().wait(policy, None, poll, meanwhile, Err), Ok(Some(())));
+        Some(worked_after.into_inner()).filter(|polls| *polls > 0)
+    }
+
+    #[test]
+    fn what_is_done_meanwhile_is_done_by_who_waits_and_what_comes_during_it_is_found() {
+        const LONG: Duration = Duration::from_secs(60);
+        for yield_for in [Duration::ZERO, LONG] {
+            for lets_others_go_first in [false, true] {
+                assert_eq!(polls_before_work(yield_for, lets_others_go_first, 0), None);
+            }
+        }
+        assert_eq!(polls_before_work(LONG, false, 1), Some(1));
+        assert_eq!(polls_before_work(LONG, true, 1), None, "others went first, and it came");
+        assert_eq!(polls_before_work(LONG, true, 2), Some(2));
+        assert_eq!(
+            polls_before_work(Duration::ZERO, true, 9),
+            Some(1),
+            "who does not yield gives way to nobody"
+        );
+    }
+
     #[test]
     fn one_call_wakes_all_who_sleep() {
         assert_eq!(woken_by(3, Bed::call_after_fence), [Woken::Called; 3]);
