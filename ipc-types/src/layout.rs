@@ -83,7 +83,15 @@ pub trait Payload: Pod + PartialEq + core::fmt::Debug + Send + Sync {
     /// The first field that holds a NaN or an infinity.
     fn first_non_finite(&self) -> Option<&'static Field> {
         const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+        const EXPONENT_ONE: u64 = 0x0010_0000_0000_0000;
+        const SIGN: u64 = 1 << 63;
         let words: &[u64] = bytemuck::cast_slice(bytemuck::bytes_of(self));
+        // In one pass over all: an exponent of ones, to which one is added, carries into the sign's place. An integer may
+        // do so, too: then fields are looked at.
+        let carries = words.iter().fold(0, |carries, word| carries | ((word & EXPONENT) + EXPONENT_ONE));
+        if carries & SIGN == 0 {
+            return None;
+        }
         Self::FIELDS.iter().filter(|field| field.scalar == Scalar::Float).find(|field| {
             let start = field.offset_bytes / size_of::<f64>();
             let words = words.get(start..start + field.size_bytes / size_of::<f64>()).unwrap_or_default();

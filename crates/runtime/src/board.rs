@@ -232,29 +232,32 @@ const LOBBIES: usize = 2;
 /// Topics of a service that have a bell of their own; any more share the last one.
 const BELLS: usize = 2 * MAX_ROBOTS + 1;
 
-/// Hears whether something may have been sent since nothing was found: looking into a queue costs more.
+/// Hears whether something may have been sent since the last look: looking into a queue costs more.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Doorbell {
-    /// How the bell stood before the look that found nothing.
+    /// How the bell stood before that look.
     heard: Option<u64>,
+    /// Whether it found something: then there may be more.
+    has_found: bool,
 }
 
 impl Doorbell {
-    /// What `look` finds, if there may be something.
+    /// What `look` finds, if there may be something; of who awaits a tick, something of that tick.
     pub(crate) fn answer<T, E>(
         &mut self,
         bell: &Bell,
+        awaited_tick: Option<u64>,
         look: impl FnOnce() -> Result<Option<T>, E>,
     ) -> Result<Option<T>, E> {
-        // Before the look: what comes during it is for the next.
+        // Before the look, and before asking for the tick: what comes during either is for the next.
         let rung = Some(bell.rung.load(Ordering::Acquire));
-        if self.heard == rung {
+        // A tick for which it will yet be rung changes how it stands. What else is still there can wait for that.
+        let may_have_more = || self.has_found && awaited_tick.is_none_or(|tick| bell.has_rung_for(tick));
+        if self.heard == rung && !may_have_more() {
             return Ok(None);
         }
         let found = look()?;
-        if found.is_none() {
-            self.heard = rung;
-        }
+        *self = Self { heard: rung, has_found: found.is_some() };
         Ok(found)
     }
 }
@@ -889,7 +892,7 @@ mod tests {
         let mut doorbell = Doorbell::default();
         let mut look = |found: Option<u8>| {
             let mut looked = false;
-            let answer = doorbell.answer(&bell, || {
+            let answer = doorbell.answer(&bell, None, || {
                 looked = true;
                 Ok::<_, ()>(found)
             });
@@ -906,6 +909,36 @@ mod tests {
         assert_eq!(look(Some(3)), (true, Ok(Some(3))));
         bell.ring_for(5);
         assert_eq!([5, 7, 8].map(|tick| bell.has_rung_for(tick)), [true, true, false]);
+    }
+
+    #[test]
+    fn who_awaits_a_tick_looks_for_more_only_once_it_was_rung_for_or_the_bell_was_rung_for_anything() {
+        let bell = Bell { rung: AtomicU64::new(0), next_tick: AtomicU64::new(0) };
+        let mut doorbell = Doorbell::default();
+        let mut looks_for = |tick: u64, found: Option<()>| {
+            let mut looked = false;
+            let answer = doorbell.answer(&bell, Some(tick), || {
+                looked = true;
+                Ok::<_, ()>(found)
+            });
+            assert_eq!(answer, Ok(found.filter(|()| looked)));
+            looked
+        };
+        bell.ring_for(3);
+        assert!(looks_for(3, Some(())));
+        assert!(looks_for(3, Some(())), "the first was another one");
+        assert!(!looks_for(4, Some(())), "of tick 4 nothing was sent");
+        bell.ring();
+        assert!(looks_for(4, Some(())), "it may have been kept");
+        assert!(!looks_for(4, Some(())));
+        bell.ring_for(4);
+        bell.ring_for(5);
+        assert!(looks_for(4, Some(())));
+        assert!(looks_for(5, Some(())), "it came before that look");
+        assert!(!looks_for(6, Some(())));
+        bell.ring_for(6);
+        assert!(looks_for(6, None));
+        assert!(!looks_for(6, Some(())), "it was rung for, and is lost");
     }
 
     #[test]

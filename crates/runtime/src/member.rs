@@ -6,7 +6,7 @@ use crate::pace::{Pace, now_ns, sleep_until, trimmed_origin_ns, yield_until};
 use crate::process::{ProcessIdentity, ProcessWatch};
 use crate::pulse;
 use crate::suspicion::{LEAST_LOOK_NS, Suspicion};
-use crate::wait::{Bed, WaitPolicy, Woken};
+use crate::wait::{Bed, Meanwhile, WaitPolicy, Woken};
 use crate::{FaultCode, Position, TickError};
 use core::cell::{Cell, RefCell};
 use mikoshi_ipc_types::ServiceId;
@@ -240,10 +240,11 @@ impl Member {
         poll: impl Fn() -> Result<Option<()>, TickError>,
     ) -> Result<Option<()>, TickError> {
         pulse::beat();
-        self.slot().porch.wait(self.policy, due_ns, poll, |_| {
+        let check = |_| {
             pulse::beat();
             if self.board.stop_is_requested() { Err(TickError::Stopped) } else { Ok(()) }
-        })
+        };
+        self.slot().porch.wait(self.policy, due_ns, poll, Meanwhile::NOTHING, check)
     }
 
     pub(crate) fn is_in_charge(&self) -> bool {
@@ -384,24 +385,26 @@ impl Member {
         mut poll: impl FnMut() -> Result<Option<T>, TickError>,
     ) -> Result<T, TickError> {
         loop {
-            if let Some(found) = self.wait_until(&self.slot().bed, None, &mut poll)? {
+            if let Some(found) = self.wait_until(&self.slot().bed, None, &mut poll, Meanwhile::NOTHING)? {
                 return Ok(found);
             }
         }
     }
 
-    /// As [`Member::wait_for`], in this bed; at `due_ns`, if there is such a time, the wait ends with nothing.
+    /// As [`Member::wait_for`], in this bed; at `due_ns`, if there is such a time, the wait ends with nothing. What
+    /// can be done `meanwhile` is, once, if it has to wait at all.
     pub(crate) fn wait_until<T>(
         &self,
         bed: &Bed,
         due_ns: Option<u64>,
         mut poll: impl FnMut() -> Result<Option<T>, TickError>,
+        meanwhile: Meanwhile<impl FnOnce()>,
     ) -> Result<Option<T>, TickError> {
         let poll = || {
             self.welcome_successors();
             poll()
         };
-        bed.wait(self.policy, due_ns, poll, |woken| {
+        bed.wait(self.policy, due_ns, poll, meanwhile, |woken| {
             pulse::beat();
             if !self.is_in_charge() {
                 return Err(TickError::Fenced);

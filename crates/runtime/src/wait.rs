@@ -73,6 +73,17 @@ const GRACE_NS: u64 = 2_000_000;
 /// How often a process gives way before it looks at its watch again.
 const YIELDS_A_LOOK: u32 = 4;
 
+/// What is done once in a wait.
+pub(crate) struct Meanwhile<F> {
+    /// Whether it first gives way, for as long as it yields at all.
+    pub lets_others_go_first: bool,
+    pub work: F,
+}
+
+impl Meanwhile<fn()> {
+    pub const NOTHING: Self = Self { lets_others_go_first: false, work: || () };
+}
+
 /// Until when something is waited for.
 struct Patience {
     due_ns: Option<u64>,
@@ -115,6 +126,9 @@ impl Bed {
     /// Polls until it returns something: at first giving way to others, then sleeping in between. After
     /// each sleep `check` may end the wait. At `due_ns`, if there is such a time, it ends with nothing.
     ///
+    /// `meanwhile` is done once if there is a wait at all: after whoever shares the core had a turn, or before the first
+    /// sleep. What comes during it is found after it: it is polled before anybody gives way or sleeps.
+    ///
     /// Nothing is lost: that somebody sleeps is noted before the last poll, and a caller reads it after what it
     /// calls for is visible. Both are separated by sequential consistency, so that the sleeper sees the event or
     /// the caller sees the sleeper.
@@ -123,6 +137,7 @@ impl Bed {
         policy: WaitPolicy,
         due_ns: Option<u64>,
         mut poll: impl FnMut() -> Result<Option<T>, E>,
+        meanwhile: Meanwhile<impl FnOnce()>,
         mut check: impl FnMut(Woken) -> Result<(), E>,
     ) -> Result<Option<T>, E> {
         if let Some(value) = poll()? {
@@ -133,12 +148,19 @@ impl Bed {
         let mut patience = Patience::until(due_ns, start_ns);
         let end_ns = start_ns.saturating_add(policy.yield_for.as_nanos() as u64);
         let mut time_ns = start_ns;
+        if meanwhile.lets_others_go_first && time_ns < end_ns && !patience.is_over(time_ns) {
+            rustix::thread::sched_yield();
+            if let Some(value) = poll()? {
+                return Ok(Some(value));
+            }
+        }
+        (meanwhile.work)();
         while time_ns < end_ns && !patience.is_over(time_ns) {
             for _ in 0..YIELDS_A_LOOK {
-                rustix::thread::sched_yield();
                 if let Some(value) = poll()? {
                     return Ok(Some(value));
                 }
+                rustix::thread::sched_yield();
             }
             time_ns = now_ns();
         }
@@ -163,10 +185,16 @@ impl Bed {
         self.places.iter().for_each(Place::call);
     }
 
+    /// Whether anybody may sleep: if not, who comes looks for itself what was written before this was asked, sequentially
+    /// consistent with it.
+    pub(crate) fn has_guests(&self) -> bool {
+        self.places.iter().any(Place::has_guests)
+    }
+
     /// As [`Bed::call`], but those who sleep on other cores are left to the watches there, as far as somebody keeps them,
     /// who are told in which slot to look.
     pub(crate) fn call_by(&self, watches: &[Watch; PLACES], slot: usize) {
-        if !self.places.iter().any(Place::has_guests) {
+        if !self.has_guests() {
             return;
         }
         if self.leave_to_watches(place_of(rustix::thread::sched_getcpu()), watches, slot) {
@@ -282,7 +310,7 @@ mod tests {
                     Ok(None::<()>)
                 };
                 // What woke it ends its wait.
-                bed.wait(policy, None, poll, Err).expect_err("there is nothing")
+                bed.wait(policy, None, poll, Meanwhile::NOTHING, Err).expect_err("there is nothing")
             };
             let threads: Vec<_> = (0..sleepers).map(|_| scope.spawn(sleeper)).collect();
             // Each looks twice before it sleeps.
@@ -305,6 +333,40 @@ mod tests {
     fn call_from_elsewhere(bed: &Bed, watches: &[Watch; PLACES]) {
         bed.leave_to_watches(PLACES, watches, 0);
         bed.call();
+    }
+
+    /// How often a wait polled before the work that is done in it, if it was; what it finds is there from poll `found_at`
+    /// on, or from the work on.
+    fn polls_before_work(yield_for: Duration, lets_others_go_first: bool, found_at: u32) -> Option<u32> {
+        let (polls, worked_after) = (AtomicU32::new(0), AtomicU32::new(0));
+        let poll = || {
+            let is_there = polls.fetch_add(1, Ordering::Relaxed) == found_at;
+            Ok((is_there || worked_after.load(Ordering::Relaxed) > 0).then_some(()))
+        };
+        let work = || worked_after.store(polls.load(Ordering::Relaxed), Ordering::Relaxed);
+        let meanwhile = Meanwhile { lets_others_go_first, work };
+        let policy = WaitPolicy { yield_for, up_early: Duration::ZERO };
+        // Nobody sleeps: what came during the work is found after it.
+        assert_eq!(Bed::default().wait(policy, None, poll, meanwhile, Err), Ok(Some(())));
+        Some(worked_after.into_inner()).filter(|polls| *polls > 0)
+    }
+
+    #[test]
+    fn what_is_done_meanwhile_is_done_by_who_waits_and_what_comes_during_it_is_found() {
+        const LONG: Duration = Duration::from_secs(60);
+        for yield_for in [Duration::ZERO, LONG] {
+            for lets_others_go_first in [false, true] {
+                assert_eq!(polls_before_work(yield_for, lets_others_go_first, 0), None);
+            }
+        }
+        assert_eq!(polls_before_work(LONG, false, 1), Some(1));
+        assert_eq!(polls_before_work(LONG, true, 1), None, "others went first, and it came");
+        assert_eq!(polls_before_work(LONG, true, 2), Some(2));
+        assert_eq!(
+            polls_before_work(Duration::ZERO, true, 9),
+            Some(1),
+            "who does not yield gives way to nobody"
+        );
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 mod calls;
 mod link;
+mod outbox;
 
 pub use link::{IceoryxLink, LinkBell, LinkError, Outlet, StandIn};
 
@@ -18,20 +19,19 @@ use crate::checkpoint::{self, Checkpoint, CheckpointWriter};
 use crate::member::{Member, TAP_LEAD_TICKS};
 use crate::pace::{Pace, now_ns};
 use crate::shared_memory::populate;
+use crate::wait::Meanwhile;
 use crate::{
     Clock, Domain, DomainError, Phase, Position, Replaceable, Session, TickError, TickSchedule, Topic,
 };
 use calls::{Awaited, Source, is_gathering};
 use core::cell::{Cell, RefCell};
-use core::mem::MaybeUninit;
 use iceoryx2::port::LoanError;
-use iceoryx2::port::publisher::Publisher as IceoryxPort;
 use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriberPort;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{LogLevel, Node, NodeBuilder, SignalHandlingMode, ipc, set_log_level};
-use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use mikoshi_ipc_types::{Envelope, Frame, Payload, ServiceId, ServicePayload};
+use outbox::{Blank, Outbox, Restock};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -115,6 +115,8 @@ pub(super) struct Process {
     run: PathBuf,
     domain: Domain,
     ports: Ports,
+    /// What sends the frames that services wait for: they are restocked while it waits itself.
+    outboxes: RefCell<Vec<Rc<dyn Restock>>>,
     /// Where the link sleeps, if there is one.
     link: Option<usize>,
 }
@@ -173,6 +175,7 @@ impl Process {
             run,
             domain,
             ports,
+            outboxes: RefCell::default(),
         }))
     }
 
@@ -217,6 +220,11 @@ impl Process {
         let port = Rc::new(port);
         self.ports.0.borrow_mut().push(Rc::clone(&port) as Rc<dyn UpdateConnections>);
         port
+    }
+
+    /// Has room for all that is said next.
+    fn restock(&self) {
+        self.outboxes.borrow().iter().for_each(|outbox| outbox.restock());
     }
 
     fn slot_of(&self, role: Role) -> Option<usize> {
@@ -385,8 +393,11 @@ impl Transport for IceoryxTransport {
             .override_sample_preallocation(move |_| frames)
             .create()
             .map_err(|error| ConnectError::Failed { topic, reason: error.to_string() })?;
-        let port = process.keep(port);
-        Ok(IceoryxPublisher { process: Rc::clone(process), port, topic, source, awaited })
+        let outbox = Rc::new(Outbox::new(process.keep(port)));
+        if awaited.is_some() {
+            process.outboxes.borrow_mut().push(Rc::clone(&outbox) as Rc<dyn Restock>);
+        }
+        Ok(IceoryxPublisher { process: Rc::clone(process), outbox, topic, source, awaited })
     }
 
     fn subscriber<P: ServicePayload>(&self, robot: usize) -> Result<IceoryxSubscriber<P>, ConnectError> {
@@ -405,6 +416,7 @@ impl Transport for IceoryxTransport {
             topic,
             source,
             is_gathering: is_gathering(phase),
+            is_last: phase.inputs.last().is_some_and(|input| input.topic == topic),
             bell: Doorbell::default(),
             arrived: Box::new(Frame::zeroed()),
             early: None,
@@ -420,7 +432,7 @@ impl Transport for IceoryxTransport {
 /// Publishes one topic, and wakes those who sleep for it.
 pub struct IceoryxPublisher<P: Payload> {
     process: Rc<Process>,
-    port: Rc<IceoryxPort<ipc::Service, Frame<P>, ()>>,
+    outbox: Rc<Outbox<P>>,
     topic: Topic,
     source: Source,
     /// If a service waits for it.
@@ -431,17 +443,12 @@ impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
     type Loan<'a> = IceoryxLoan<'a, P>;
 
     fn loan(&mut self, tick: u64) -> Result<IceoryxLoan<'_, P>, TickError> {
-        let mut sample = self.port.loan_uninit().map_err(|error| match error {
+        let mut sample = self.outbox.take().map_err(|error| match error {
             LoanError::OutOfMemory | LoanError::ExceedsMaxLoans => {
                 TickError::PublisherFull { topic: self.topic, tick }
             }
             _ => TickError::TransportFailed { topic: self.topic },
         })?;
-        let frame = sample.payload_mut();
-        *frame = MaybeUninit::zeroed();
-        // SAFETY: a frame consists of `Pod` values, for which all zeros are valid, and it was zeroed in
-        // the line above.
-        let mut sample = unsafe { sample.assume_init() };
         sample.payload_mut().envelope = Envelope {
             schema_hash: P::SCHEMA_HASH,
             epoch: self.process.member.epoch(),
@@ -458,7 +465,7 @@ impl<P: Payload> Publisher<P> for IceoryxPublisher<P> {
 
 /// A frame that is being filled in shared memory.
 pub struct IceoryxLoan<'a, P: Payload> {
-    pub(super) sample: SampleMut<ipc::Service, Frame<P>, ()>,
+    pub(super) sample: Blank<P>,
     publisher: &'a IceoryxPublisher<P>,
 }
 
@@ -486,6 +493,8 @@ pub struct IceoryxSubscriber<P: Payload> {
     source: Source,
     /// Whether it sleeps alone.
     is_gathering: bool,
+    /// Whether its phase has then heard all inputs: they are received in the schedule's order.
+    is_last: bool,
     bell: Doorbell,
     /// Where frames are copied to before they are looked at: shared memory may change under the eyes.
     arrived: Box<Frame<P>>,
@@ -496,14 +505,16 @@ pub struct IceoryxSubscriber<P: Payload> {
 impl<P: Payload> Subscriber<P> for IceoryxSubscriber<P> {
     fn receive(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
         let received = self.receive_in_time(tick, frame);
-        self.process.heard_ns.set(now_ns());
+        if self.is_last {
+            self.process.heard_ns.set(now_ns());
+        }
         received
     }
 }
 
 impl<P: Payload> IceoryxSubscriber<P> {
     fn receive_in_time(&mut self, tick: u64, frame: &mut Frame<P>) -> Result<(), TickError> {
-        let Self { process, port, topic, source, is_gathering, bell, arrived, early } = self;
+        let Self { process, port, topic, source, is_gathering, bell, arrived, early, .. } = self;
         let (topic, due_ns) = (*topic, process.due_ns.get());
         let missing = TickError::InputMissing { topic, tick };
         // By the clock one goes on without what was lost, and uses what follows in its turn.
@@ -517,9 +528,12 @@ impl<P: Payload> IceoryxSubscriber<P> {
             return Ok(());
         }
         let bed = if *is_gathering { &process.member.slot().bed } else { slot.lobby(phase) };
-        let found = process.member.wait_until(bed, due_ns, || {
-            let receive = || port.receive().map_err(|_| TickError::TransportFailed { topic });
-            while let Some(sample) = bell.answer(slot.bell(place), receive)? {
+        let poll = || {
+            loop {
+                let receive = || port.receive().map_err(|_| TickError::TransportFailed { topic });
+                let Some(sample) = bell.answer(slot.bell(place), Some(tick), receive)? else {
+                    return Ok(None);
+                };
                 **arrived = *sample.payload();
                 drop(sample);
                 match judge(arrived, topic, phase, slot.charge(), tick) {
@@ -535,8 +549,10 @@ impl<P: Payload> IceoryxSubscriber<P> {
                     Err(error) => return Err(error),
                 }
             }
-            Ok(None)
-        })?;
+        };
+        // Who waits for several has let others go first, or was the last of all.
+        let meanwhile = Meanwhile { lets_others_go_first: !*is_gathering, work: || process.restock() };
+        let found = process.member.wait_until(bed, due_ns, poll, meanwhile)?;
         found.ok_or(missing)?;
         *frame = **arrived;
         Ok(())
@@ -640,7 +656,7 @@ impl<P: Payload> Observer<P> for IceoryxObserver<P> {
         self.process.member.welcome_successors();
         let slot = self.process.slot_at(self.source).ok_or(TickError::TransportFailed { topic })?;
         let receive = || self.port.receive().map_err(|_| TickError::TransportFailed { topic });
-        let Some(sample) = self.bell.answer(slot.bell(self.source.place), receive)? else {
+        let Some(sample) = self.bell.answer(slot.bell(self.source.place), None, receive)? else {
             return Ok(false);
         };
         *frame = *sample.payload();
@@ -653,12 +669,13 @@ impl<P: Payload> Observer<P> for IceoryxObserver<P> {
     fn receive(&mut self, frame: &mut Frame<P>) -> Result<bool, TickError> {
         let (process, source) = (Rc::clone(&self.process), self.source);
         let slot = process.slot_at(source).ok_or(TickError::TransportFailed { topic: self.topic })?;
-        let found = process.member.wait_until(slot.lobby(source.phase), None, || {
+        let poll = || {
             // Asked first: what was published before the end is found after it.
             let have_ended = process.member.all_services_have_ended();
             let is_found = self.try_receive(frame)?;
             Ok((is_found || have_ended).then_some(is_found))
-        })?;
+        };
+        let found = process.member.wait_until(slot.lobby(source.phase), None, poll, Meanwhile::NOTHING)?;
         Ok(found.unwrap_or(false))
     }
 }

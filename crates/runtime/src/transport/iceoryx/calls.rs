@@ -2,6 +2,7 @@
 
 use super::Process;
 use crate::board::{Role, Slot};
+use crate::wait::Bed;
 use crate::{Clock, Phase, Topic};
 
 /// Whether a phase waits for several publishers.
@@ -75,7 +76,13 @@ impl Process {
         }
     }
 
+    /// Whoever sleeps there has noted that before it looked for the last time, so that it has seen all that was rung for
+    /// before nobody was found asleep. Only then do the bells of others matter, which they have written last.
     fn call_if_complete(&self, gathering: &Gathering, tick: u64) {
+        let bed = self.member.board().slots().get(gathering.slot).map(|slot| &slot.bed);
+        if !bed.is_some_and(Bed::has_guests) {
+            return;
+        }
         let is_there = |(source, age_ticks): &(Source, u64)| {
             let tick = (tick + gathering.age_ticks).checked_sub(*age_ticks);
             let slot = self.slot_at(*source);

@@ -9,7 +9,7 @@ use crate::pace::now_ns;
 use crate::pulse;
 use crate::transport::accept::{Verdict, judge};
 use crate::transport::{ConnectError, consumer_depth};
-use crate::wait::WaitPolicy;
+use crate::wait::{Meanwhile, WaitPolicy};
 use crate::{Clock, Position, TickError, TickSchedule, Topic};
 use core::cell::Cell;
 use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriberPort;
@@ -89,7 +89,7 @@ impl IceoryxLink {
         // There may be something to do in every turn: then it never waits.
         pulse::beat();
         let member = &self.process.member;
-        member.wait_until(&member.slot().bed, due_ns, poll)
+        member.wait_until(&member.slot().bed, due_ns, poll, Meanwhile::NOTHING)
     }
 
     /// Says how far it is.
@@ -172,7 +172,7 @@ impl<P: Payload> Outlet<P> {
         let topic = *topic;
         let slot = process.slot_at(*source).ok_or(TickError::TransportFailed { topic })?;
         let receive = || port.receive().map_err(|_| TickError::TransportFailed { topic });
-        while let Some(sample) = bell.answer(slot.bell(source.place), receive)? {
+        while let Some(sample) = bell.answer(slot.bell(source.place), None, receive)? {
             **arrived = *sample.payload();
             drop(sample);
             let tick = arrived.envelope.tick;
