@@ -210,6 +210,7 @@ fn stabiliser() -> Spread {
         standing: PerFoot::from_fn(|side| Some(now.feet[side].pose)),
         ground_wrench: PerFoot { right: wrench, left: wrench },
         load: ExternalLoad::NONE,
+        rests: false,
     };
     let mut state = StabiliserState::default();
     measure(&mut |_, count| {

@@ -85,6 +85,7 @@ impl Loop {
             standing: PerFoot::from_fn(|side| now.feet[side].in_contact.then_some(now.feet[side].pose)),
             ground_wrench: self.plant.ground_wrench,
             load: sensed,
+            rests: false,
         };
         let stabilisation = self.stabiliser.map(|stabiliser| stabiliser.act(&mut self.state, &inputs));
         self.clock = self.clock.advance(&self.robot.gait.config().timing, &[self.robot.wish()], true);
@@ -146,6 +147,7 @@ fn tilt_left(config: StabiliserConfig, damping_nms_rad: f64) -> f64 {
         standing,
         ground_wrench: PerFoot::from_fn(|_| Wrench::zero()),
         load: ExternalLoad::NONE,
+        rests: false,
     };
     let mut state = StabiliserState::default();
     let desired = stabiliser.act(&mut state.clone(), &inputs).loads;
@@ -265,6 +267,7 @@ fn balanced() -> StabiliserInputs {
         standing: PerFoot::from_fn(|side| Some(feet()[side].at_height(0.0))),
         ground_wrench: PerFoot { right: wrench, left: wrench },
         load: ExternalLoad::NONE,
+        rests: false,
     }
 }
 
@@ -312,6 +315,57 @@ fn a_sole_that_presses_too_far_ahead_yields_by_lifting_its_toe() {
         "pressing left lifts the left edge"
     );
     assert!(state.sole_tilt.left.y.abs() < 1e-9 && state.sole_tilt.right.x.abs() < 1e-9);
+}
+
+/// How far soles go to and fro in the last second of `seconds`, under moments that come and go at random by 10 Nm a tick.
+fn unrest_rad(rests: bool, seconds: usize) -> f64 {
+    let (stabiliser, mut state) = (Stabiliser::new(config()), StabiliserState::default());
+    let (ticks, mut noise) = ((seconds as f64 / DT) as usize, 1_u64);
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for tick in 0..ticks {
+        noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let mut inputs = StabiliserInputs { rests, ..balanced() };
+        inputs.ground_wrench.right.moment.x += if noise >> 63 == 1 { 10.0 } else { -10.0 };
+        stabiliser.act(&mut state, &inputs);
+        if tick + (1.0 / DT) as usize >= ticks {
+            (least, most) = (least.min(state.sole_tilt.right.x), most.max(state.sole_tilt.right.x));
+        }
+    }
+    most - least
+}
+
+#[test]
+fn soles_of_a_robot_that_rests_come_to_rest_on_ground_that_rattles() {
+    let (restless, early, late) = (unrest_rad(false, 12), unrest_rad(true, 3), unrest_rad(true, 12));
+    assert!(late < 0.05 * restless && late < 0.5 * early, "{restless} {early} {late}");
+}
+
+#[test]
+fn soles_come_to_rest_where_they_would_have_come_without() {
+    let tilt = |rests| {
+        let (stabiliser, mut state) = (Stabiliser::new(config()), StabiliserState::default());
+        for _ in 0..(12.0 / DT) as usize {
+            let mut inputs = StabiliserInputs { rests, ..balanced() };
+            inputs.ground_wrench.right.moment.x += 4.0;
+            stabiliser.act(&mut state, &inputs);
+        }
+        state.sole_tilt.right.x
+    };
+    assert!((tilt(true) / tilt(false) - 1.0).abs() < 0.05, "{} {}", tilt(true), tilt(false));
+}
+
+#[test]
+fn a_robot_that_is_pushed_has_not_rested_any_more() {
+    let (stabiliser, mut state) = (Stabiliser::new(config()), StabiliserState::default());
+    let resting = StabiliserInputs { rests: true, ..balanced() };
+    for _ in 0..2000 {
+        stabiliser.act(&mut state, &resting);
+    }
+    let pushed = StabiliserInputs { com_velocity: Vector2::new(0.0, 0.1), ..resting };
+    let mut awake = StabiliserState { rested_s: 0.0, ..state };
+    stabiliser.act(&mut state, &pushed);
+    stabiliser.act(&mut awake, &StabiliserInputs { rests: false, ..pushed });
+    assert_eq!(state, awake);
 }
 
 #[test]

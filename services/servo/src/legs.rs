@@ -244,6 +244,7 @@ impl Legs {
         let stabilisation = self.stabiliser.as_ref().map(|stabiliser| {
             let inputs =
                 felt.map_or_else(|| stabiliser_inputs_as_planned(&now), |felt| stabiliser_inputs(&now, felt));
+            let inputs = StabiliserInputs { rests: rests(state), ..inputs };
             stabiliser.act(&mut state.stabiliser, &inputs)
         });
         let was_swinging = is_swinging(&state.gait);
@@ -428,6 +429,7 @@ fn stabiliser_inputs(now: &GaitReference, felt: &Felt) -> StabiliserInputs {
         standing: PerFoot::from_fn(|side| now.feet[side].in_contact.then_some(now.feet[side].pose)),
         ground_wrench: felt.ground_wrench,
         load: felt.load,
+        rests: false,
     }
 }
 
@@ -451,7 +453,14 @@ fn stabiliser_inputs_as_planned(now: &GaitReference) -> StabiliserInputs {
         standing: PerFoot { right: None, left: None },
         ground_wrench: PerFoot { right: Wrench::zero(), left: Wrench::zero() },
         load: ExternalLoad::NONE,
+        rests: false,
     }
+}
+
+/// Whether a robot stands that has found its ground not to be level: soles that lie flat rattle on nothing.
+fn rests(state: &LegsState) -> bool {
+    let is_level = Side::BOTH.iter().all(|&side| state.ground_tilt[side] == Vector3::zeros());
+    matches!(state.gait.phase, GaitPhase::Standing { .. }) && !is_level
 }
 
 fn is_swinging(gait: &GaitState) -> bool {

@@ -49,6 +49,8 @@ pub struct StabiliserConfig {
     pub edge_rad_s2_nm: f64,
     /// At most \[rad/s\].
     pub edge_max_rad_s: f64,
+    /// τ: soles of a robot that has rested for t move τ / (τ + t) as fast as they would \[s\].
+    pub rest_s: f64,
     /// Admittance of the force difference between the feet.
     pub force_difference_m_s_n: f64,
     /// Largest difference of the feet's heights \[m\].
@@ -85,6 +87,7 @@ impl StabiliserConfig {
             edge_patience_m_s: 0.0008,
             edge_rad_s2_nm: 0.15,
             edge_max_rad_s: 0.4,
+            rest_s: 0.3,
             force_difference_m_s_n: 3e-5,
             height_difference_max_m: 0.03,
             com_admittance_1_s2: 0.0,
@@ -134,6 +137,8 @@ pub struct StabiliserState {
     pub sole_turning: PerFoot<Vector2<f64>>,
     /// Height of the left sole over the right one \[m\].
     pub height_difference: f64,
+    /// For how long the robot has rested in balance \[s\].
+    pub rested_s: f64,
     /// Offset of the centre of mass \[m, world\].
     pub com_offset: Vector2<f64>,
     /// Its velocity \[m/s\].
@@ -159,6 +164,8 @@ pub struct StabiliserInputs {
     pub ground_wrench: PerFoot<Wrench<World>>,
     /// The measured hands' load.
     pub load: ExternalLoad,
+    /// Whether the robot is to rest: on both feet, none of which is to be lifted, and on ground that is not level.
+    pub rests: bool,
 }
 
 /// What the feet and the centre of mass shall do beside the gait, and why.
@@ -234,7 +241,10 @@ impl Stabiliser {
     ///    One that stands on the edge of something does not feel its turning: it turns faster and faster until it does.
     /// 5. Force difference: `d(h)/dt = A ((f_L − f_R) − desired) − h / leak`, h the left sole's height
     ///    over the right one's, half of it to each: the foot that bears too much is drawn up.
-    /// 6. Admittance of the centre of mass to the error of the zero moment point (off by default).
+    /// 6. Soles of a robot that has rested for t, balanced, do 4 and 5 `τ / (τ + t)` as fast: what contacts rattle is
+    ///    averaged out over all the time that it has stood, as by any gain that falls with 1/t (Robbins and Monro 1951),
+    ///    and what soles rest at is the same.
+    /// 7. Admittance of the centre of mass to the error of the zero moment point (off by default).
     ///
     /// Where nothing stands, everything leaks.
     pub fn act(&self, state: &mut StabiliserState, inputs: &StabiliserInputs) -> Stabilisation {
@@ -260,6 +270,10 @@ impl Stabiliser {
         let force = pendulum.weight_n() * inputs.load.kappa;
         let loads = distribute(force, &zmp, &self.inner_soles, &config.zmp_in_foot, &inputs.standing);
 
+        let is_balanced = dcm_error.norm() < config.edge_dcm_m;
+        state.rested_s = if inputs.rests && is_balanced { state.rested_s + dt } else { 0.0 };
+        // All that follows moves soles.
+        let dt = dt * (config.rest_s / (config.rest_s + state.rested_s));
         for side in Side::BOTH {
             let tilt = &mut state.sole_tilt[side];
             let turning = &mut state.sole_turning[side];
@@ -275,7 +289,6 @@ impl Stabiliser {
                 // By where a foot bears and not by how much: one that has just landed feels an edge as well.
                 let bears = inputs.ground_wrench[side].force.z;
                 let wanted = FootLoad { force: bears, ..loads[side] };
-                let is_balanced = dcm_error.norm() < config.edge_dcm_m;
                 let feels = is_balanced && bears > LEAST_SHARE * pendulum.weight_n();
                 let off = if feels {
                     in_foot(
@@ -353,4 +366,4 @@ fn settled(turning: f64, patience: f64, dt: f64) -> f64 {
     if fades { turning - turns * (dt / EDGE_SETTLE_S).min(1.0) } else { 0.0 }
 }
 
-const _: () = assert!(size_of::<StabiliserState>() == 15 * size_of::<f64>());
+const _: () = assert!(size_of::<StabiliserState>() == 16 * size_of::<f64>());
