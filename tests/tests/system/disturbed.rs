@@ -53,11 +53,10 @@ fn a_team_walks_over_slippery_soft_patches_that_it_knows_nothing_of() {
     passed("uneven.toml", &arguments);
 }
 
-/// A walk over boards that nothing stops, for so long.
-fn walks_on(seed: &str, duration_s: &str) {
-    let duration = format!("duration_s={duration_s}");
+/// A walk over boards that nothing stops; what is left when it is over is another matter.
+fn walks_on(seed: &str) {
     let short = [
-        duration.as_str(),
+        "duration_s=24.5",
         "thresholds.object_travel_min_m=",
         "thresholds.object_travel_min_rad=",
         "thresholds.internal_end_n=",
@@ -72,20 +71,20 @@ fn walks_on(seed: &str, duration_s: &str) {
 /// seemed to slip at 17 s.
 #[test]
 fn a_team_whose_robot_lands_on_edges_of_boards_step_after_step_walks_on() {
-    walks_on("4", "24.5");
+    walks_on("4");
 }
 
 /// Of this seed a sole comes to lie half on a board, its outer side up: its ankle had no room left at 15.4 s, the hands moved by
 /// 25 mm, and at 17.3 s the team stopped with more than 400 N between them.
 #[test]
 fn a_team_whose_robot_has_an_ankle_at_its_limit_walks_on() {
-    walks_on("109", "18.5");
+    walks_on("109");
 }
 
 /// Of this seed a robot stands on the edge of its sole and turns about it by 26 mrad: its hands seemed to slip at 19.4 s.
 #[test]
 fn a_team_whose_robot_pivots_on_an_edge_walks_on() {
-    walks_on("112", "20.5");
+    walks_on("112");
 }
 
 /// Of this seed a sole comes to stand on a few points that rattle: ankles that went on to yield to them left 4.5 N between two
