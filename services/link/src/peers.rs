@@ -151,6 +151,7 @@ impl Peers {
     /// What we say of ourselves.
     pub fn hello(&self, board: &Board) -> Vec<u8> {
         let mut hello = Hello { run: self.run, stops: board.stops(), ..Hello::zeroed() };
+        let knows_all = self.knows_all(board);
         for (place, known) in hello.services.iter_mut().zip(&self.services) {
             let (service, moves) = (&known.service, known.moves());
             if known.host_after(moves) == Some(self.own) {
@@ -158,7 +159,7 @@ impl Peers {
                 let state = board
                     .states()
                     .find_map(|(role, state)| (role == Role::Service(*service)).then_some(state));
-                place.state = state.unwrap_or(State::Absent) as u64;
+                place.state = said_of(state.unwrap_or(State::Absent), knows_all) as u64;
                 place.tick = board.last_position(*service).unwrap_or_default().tick;
             }
         }
@@ -166,6 +167,15 @@ impl Peers {
             *heard = peer.known().heard;
         }
         self.header().with(&[bytes_of(&hello)])
+    }
+
+    /// Whether all hosts have introduced themselves that services on this board exchange frames with.
+    fn knows_all(&self, board: &Board) -> bool {
+        let mut hosts = board.states().filter_map(|(role, _)| match role {
+            Role::Service(service) => self.host_of(service),
+            _ => None,
+        });
+        hosts.all(|host| host == self.own || self.incarnation_of(host) > 0)
     }
 
     /// Hears what another host says of itself; whether it says anything new.
@@ -380,6 +390,12 @@ impl Known {
 
 const _: () = assert!(MAX_PLACES >= 3);
 
+/// What others are told of a service in this state. Who hears that it is ready begins to send, and frames of a host that
+/// has not introduced itself are refused: so it is not before its own host knows all.
+fn said_of(state: State, knows_all: bool) -> State {
+    if state == State::Ready && !knows_all { State::Wired } else { state }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -422,6 +438,20 @@ mod tests {
 
     fn board(folder: &Path) -> Board {
         Board::create_for_host(folder, &ServiceId::of_team(2).collect::<Vec<_>>(), &[]).expect("a board")
+    }
+
+    #[test]
+    fn nobody_is_ready_for_hosts_that_are_not_known() {
+        let (run, folder) = (run(), tempfile::tempdir().expect("a folder"));
+        let board = board(folder.path());
+        let (stage, robots) = (Peers::new(&run, HASH, 0, 5), Peers::new(&run, HASH, 1, 20));
+        assert!(!stage.knows_all(&board));
+        stage.hear(1, &robots.hello(&board));
+        assert!(stage.knows_all(&board) && !robots.knows_all(&board));
+        assert_eq!(said_of(State::Ready, false), State::Wired);
+        for (state, knows_all) in [(State::Ready, true), (State::Running, false), (State::Starting, false)] {
+            assert_eq!(said_of(state, knows_all), state);
+        }
     }
 
     #[test]
