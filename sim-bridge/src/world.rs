@@ -17,6 +17,7 @@ use mikoshi_ipc_types::{JointCommand, MAX_HANDS, ObjectTruth, Push, RobotTruth, 
 use mikoshi_physics::{
     ActivePush, BuildWorldError, LoadWorldError, Noise, ObjectBody, Physics, PushScript, SETTLING_S,
     SensorCounts, Spring, StepWorldError, are_active, begin, check_commands, drive_reference, force_n,
+    steps_in_a_tick,
 };
 use mikoshi_runtime::{read_parts, write_parts};
 use mikoshi_spatial::{Hand, Wrench};
@@ -114,17 +115,7 @@ impl Physics for World {
     fn new(run: &RunSpec) -> Result<Self, BuildWorldError> {
         logging::install();
         let scenario = &run.scenario;
-        let substeps = scenario.substeps();
-        let remainder_s = substeps as f64 * scenario.physics.step_s - scenario.control_period_s;
-        if substeps == 0 || remainder_s.abs() > 1e-9 {
-            return Err(BuildWorldError::Inconsistent {
-                place: "[physics]".to_owned(),
-                what: format!(
-                    "step_s = {} does not divide control_period_s = {}",
-                    scenario.physics.step_s, scenario.control_period_s
-                ),
-            });
-        }
+        let substeps = steps_in_a_tick(scenario)?;
         let Description { robots, grasps, spring, xml } = Description::of(run)?;
         let model = MjModel::from_xml_string(&xml).map_err(rejects)?;
         let bodies = ObjectBodies::new(run, |body| {

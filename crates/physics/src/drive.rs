@@ -1,6 +1,7 @@
 //! What drives are told in a tick.
 
-use crate::StepWorldError;
+use crate::{BuildWorldError, StepWorldError};
+use mikoshi_config::Scenario;
 use mikoshi_ipc_types::JointCommand;
 
 /// The position that a drive of stiffness `kp` and damping `kv` is to be at, `share` of the way from one command to the
@@ -14,6 +15,21 @@ pub fn drive_reference(
     let (start, end) = (from.joint_position_ref_rad[joint], to.joint_position_ref_rad[joint]);
     let feed_forward = if kp > 0.0 { kv / kp * to.joint_velocity_ref_rad_s[joint] } else { 0.0 };
     start + share * (end - start) + feed_forward
+}
+
+/// How many steps of physics drives take to a new command.
+///
+/// # Errors
+/// A step does not divide a tick.
+pub fn steps_in_a_tick(scenario: &Scenario) -> Result<u64, BuildWorldError> {
+    let (steps, step_s, period_s) = (scenario.substeps(), scenario.physics.step_s, scenario.control_period_s);
+    if steps == 0 || (steps as f64 * step_s - period_s).abs() > 1e-9 {
+        return Err(BuildWorldError::Inconsistent {
+            place: "[physics]".to_owned(),
+            what: format!("step_s = {step_s} does not divide control_period_s = {period_s}"),
+        });
+    }
+    Ok(steps)
 }
 
 /// Whether so many robots can follow these.

@@ -22,7 +22,7 @@ mod push;
 mod random;
 mod truth;
 
-pub use drive::{check_commands, drive_reference};
+pub use drive::{check_commands, drive_reference, steps_in_a_tick};
 pub use error::{BuildWorldError, LoadWorldError, StepWorldError};
 pub use grasp::{Spring, grasp_offsets};
 pub use ground::{Slab, slabs};

@@ -401,7 +401,7 @@ impl Legs {
     /// What feet do that turn on the ground the estimate of the base knows, and nobody else: commands that followed them
     /// would have them turn on.
     fn follow_pivots(&self, state: &mut LegsState, felt: &Felt) {
-        let stands = matches!(state.gait.phase, GaitPhase::Standing { .. });
+        let stands = is_standing(&state.gait);
         for side in Side::BOTH {
             let pivoting = &mut state.pivoting[side];
             let is_up = state.gait.phase.swinging_foot().is_some_and(|foot| foot.side == side);
@@ -460,7 +460,11 @@ fn stabiliser_inputs_as_planned(now: &GaitReference) -> StabiliserInputs {
 /// Whether a robot stands that has found its ground not to be level: soles that lie flat rattle on nothing.
 fn rests(state: &LegsState) -> bool {
     let is_level = Side::BOTH.iter().all(|&side| state.ground_tilt[side] == Vector3::zeros());
-    matches!(state.gait.phase, GaitPhase::Standing { .. }) && !is_level
+    is_standing(&state.gait) && !is_level
+}
+
+fn is_standing(gait: &GaitState) -> bool {
+    matches!(gait.phase, GaitPhase::Standing { .. })
 }
 
 fn is_swinging(gait: &GaitState) -> bool {

@@ -13,7 +13,7 @@ use mikoshi_ipc_types::{
 use mikoshi_physics::{
     ActivePush, BuildWorldError, GRAVITY_M_S2, LoadWorldError, Noise, ObjectBody, Physics, PushScript,
     SETTLING_S, SensorCounts, Spring, Stance, Standing, StepWorldError, begin, check_commands, force_n,
-    grasp_offsets,
+    grasp_offsets, steps_in_a_tick,
 };
 use mikoshi_spatial::{Foot, Hand as HandFrame, Object, Pose, Twist, Wrench};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -72,6 +72,7 @@ impl Physics for World {
     fn new(run: &RunSpec) -> Result<Self, BuildWorldError> {
         let scenario = &run.scenario;
         refuse_what_is_not_here(run)?;
+        let substeps = steps_in_a_tick(scenario)?;
         let mut world =
             PhysicsWorld { gravity: vector(&(Vector3::z() * -GRAVITY_M_S2)), ..Default::default() };
         set_up_solver(&mut world.integration_parameters, scenario);
@@ -111,7 +112,7 @@ impl Physics for World {
             bodies: vec![],
             spring: hand::spring(scenario, hands)?,
             push_script: PushScript::default(),
-            substeps: scenario.substeps(),
+            substeps,
             depth: scenario.sensors.delay_ticks as usize + 1,
             fingerprint: xxh3_64(format!("{} {run:?}", Self::ENGINE).as_bytes()),
             tick: 0,
@@ -221,13 +222,6 @@ fn refuse_what_is_not_here(run: &RunSpec) -> Result<(), BuildWorldError> {
     }
     if scenario.world.ground.is_some() {
         return refuse("[world.ground]", "the floor is flat in this engine: leave it out".to_owned());
-    }
-    let (step_s, period_s) = (scenario.physics.step_s, scenario.control_period_s);
-    if scenario.substeps() == 0 || (scenario.substeps() as f64 * step_s - period_s).abs() > 1e-9 {
-        return refuse(
-            "[physics]",
-            format!("step_s = {step_s} does not divide control_period_s = {period_s}"),
-        );
     }
     Ok(())
 }
